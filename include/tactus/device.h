@@ -1,0 +1,105 @@
+/* Devices: a URI is opened, started with settings, and read reading by reading. Also the language for loading. */
+#ifndef TACTUS_DEVICE_H
+#define TACTUS_DEVICE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <tactus/export.h>
+#include <tactus/readout.h>
+#include <tactus/table.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- protocols: what load is applied, and when ------------------------------------------------------------------ */
+
+typedef struct tactus_protocol tactus_protocol;
+
+/**
+ * Reads a protocol such as "rest 2s, staircase 0N..250N 5N 2s, sine 0.5Hz 1.1N..3.2N 120s" (the language is described
+ * in tactus-protocol(7)). TACTUS_ERR_ARGUMENT with a message that shows the text and points at the word.
+ */
+TACTUS_API int tactus_protocol_parse(const char *text, uint64_t seed, tactus_protocol **protocol);
+TACTUS_API void tactus_protocol_free(tactus_protocol *protocol);
+TACTUS_API double tactus_protocol_duration_s(const tactus_protocol *protocol);
+/** The load at an instant; before the start that of the start, after the end that of the end. */
+TACTUS_API double tactus_protocol_force_N(const tactus_protocol *protocol, double time_s);
+/** Largest load of the whole protocol. */
+TACTUS_API double tactus_protocol_maximum_N(const tactus_protocol *protocol);
+
+/* ---- devices ------------------------------------------------------------------------------------------------------
+ */
+
+typedef struct tactus_device tactus_device;
+
+enum tactus_mode { TACTUS_MODE_DC = 1, TACTUS_MODE_AC = 2 };
+
+/** What to acquire. Zero, NULL or NaN: the device's default. */
+typedef struct {
+	const int *channels; /**< in the order of the scan */
+	size_t channel_count;
+	unsigned modes; /**< TACTUS_MODE_DC | TACTUS_MODE_AC, interleaved per channel */
+	double drive_V; /**< AC peak */
+	double frequency_Hz;
+	double rate_Hz;       /**< scans per second */
+	double settle_s;      /**< after every switch */
+	uint64_t count;       /**< scans; 0: no limit */
+	double duration_s;    /**< NaN: no limit */
+	const char *protocol; /**< load to apply (simulated benches only); the scan ends with it */
+	const char *loads;    /**< "standard" or a file: known R ∥ C in place of the sensors (simulated benches only) */
+	uint64_t seed;        /**< simulated benches; 0: the bench's own */
+	bool realtime;        /**< simulated and replayed devices: pace by the clock */
+} tactus_scan_settings;
+
+/** All defaults. */
+TACTUS_API tactus_scan_settings tactus_scan_defaults(void);
+
+/** One reading as the device gives it. NaN where it has no such value. */
+typedef struct {
+	double time_s;
+	uint64_t sequence;
+	int channel;
+	enum tactus_mode mode;
+	double drive_V, frequency_Hz;
+	double detector_amplitude_V, detector_phase_V, detector_dc_V;
+	double force_N, temperature_degC;
+	double reference_resistance_ohm, reference_capacitance_F; /**< known loads */
+	unsigned quality;
+} tactus_reading;
+
+/** Opens a device by its URI. TACTUS_ERR_DEVICE or TACTUS_ERR_PERMISSION; close with tactus_device_close(). */
+TACTUS_API int tactus_device_open(const char *uri, tactus_device **device);
+TACTUS_API void tactus_device_close(tactus_device *device);
+/** Checks the settings (TACTUS_ERR_ARGUMENT before anything is written to the device) and starts. */
+TACTUS_API int tactus_device_start(tactus_device *device, const tactus_scan_settings *settings);
+/**
+ * The next readings, at least one and at most max; 0 when the scan is over. May block for one scan period.
+ * TACTUS_ERR_LOST when the device is gone.
+ */
+TACTUS_API long tactus_device_read(tactus_device *device, tactus_reading *readings, size_t max);
+TACTUS_API int tactus_device_stop(tactus_device *device);
+/** What a recording of this scan says in its metadata (identity, rates, Rg, detectors, ADC); owned by the device. */
+TACTUS_API const tactus_metadata *tactus_device_metadata(const tactus_device *device);
+/** Number of scans that the running scan will have, 0 if it is not known: for a progress display. */
+TACTUS_API uint64_t tactus_device_expected_scans(const tactus_device *device);
+
+/** Calls `found` for every device that can be opened: its URI and one line of description. Stops when it returns false.
+ */
+TACTUS_API int tactus_device_list(bool (*found)(void *context, const char *uri, const char *description),
+								  void *context);
+
+/**
+ * Readings of a scan as a table in the contract's columns: raw (detector volts) or as amplitude and phase, ready for
+ * tactus_converter_new(). Creates the columns on the first call and sets the rows.
+ */
+TACTUS_API int tactus_device_table(const tactus_device *device, const tactus_reading *readings, size_t n, bool raw,
+								   tactus_table *table);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

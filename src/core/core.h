@@ -1,0 +1,29 @@
+/* What every part of the library uses: failing with a message, checked allocation. */
+#ifndef TACTUS_CORE_H
+#define TACTUS_CORE_H
+
+#include <stddef.h>
+
+#include <tactus/error.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Sets this thread's message and returns code, so that one can write `return tactus_fail(TACTUS_ERR_…, "…", …);`. */
+int tactus_fail(int code, const char *format, ...) TACTUS_PRINTF(2, 3);
+/** Puts text in front of the present message ("run.csv:12: " + message) and returns code. */
+int tactus_fail_prefix(int code, const char *format, ...) TACTUS_PRINTF(2, 3);
+
+/** strdup of at most length bytes; NULL when memory runs out. */
+char *tactus_strndup(const char *text, size_t length);
+/** printf into fresh memory; NULL when memory runs out. */
+char *tactus_asprintf(const char *format, ...) TACTUS_PRINTF(1, 2);
+
+#define TACTUS_COUNT(array) (sizeof(array) / sizeof((array)[0]))
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
