@@ -4,10 +4,10 @@
 
 #if defined(__GNUC__)
 #define TACTUS_API __attribute__((visibility("default")))
-#define TACTUS_PRINTF(format, first) __attribute__((format(printf, format, first)))
+#define TACTUS_PRINTF(string, first) __attribute__((__format__(__printf__, string, first)))
 #else
 #define TACTUS_API
-#define TACTUS_PRINTF(format, first)
+#define TACTUS_PRINTF(string, first)
 #endif
 
 #endif
