@@ -59,6 +59,12 @@ int tactus_model_chain(const tactus_model *model, const tactus_model_channel_dat
 /* Names of an estimator's parameters, NULL-terminated. */
 const char *const *tactus_estimator_parameters(enum tactus_form form);
 const char *tactus_form_name(enum tactus_form form);
+/* The form of that name, or -1. */
+int tactus_form_find(const char *name);
+/* True if the form uses the domain's base equations. */
+bool tactus_form_has_base(enum tactus_form form);
+/* The unit that "output0" or "output1" stands for in this model; any other unit as it is. */
+const char *tactus_model_unit(const tactus_model *model, const char *unit);
 
 #ifdef __cplusplus
 }
