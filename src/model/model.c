@@ -25,6 +25,14 @@ static const struct {
 							 (const char *const[]){"S", "S", "F", "F", "N", "N", "", "", "", "", "", "", "", "", ""}},
 };
 
+const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tactus_role role, size_t i)
+{
+	for (size_t s = 0; s < domain->signal_count; s++)
+		if (domain->signals[s].role == role && i-- == 0)
+			return &domain->signals[s];
+	return NULL;
+}
+
 const char *tactus_form_name(enum tactus_form form)
 {
 	return forms[form].name;
@@ -33,6 +41,11 @@ const char *tactus_form_name(enum tactus_form form)
 const char *const *tactus_estimator_parameters(enum tactus_form form)
 {
 	return forms[form].parameters;
+}
+
+const char *const *tactus_estimator_units(enum tactus_form form)
+{
+	return forms[form].units;
 }
 
 int tactus_form_find(const char *name)
@@ -237,10 +250,9 @@ const char *tactus_model_unit(const tactus_model *model, const char *unit)
 		return unit;
 	size_t output = unit[6] == '1' ? 1 : 0;
 	const char *name = model->output_name[output];
-	for (size_t s = 0, o = 0; !name && s < model->domain->signal_count; s++)
-		if (model->domain->signals[s].role == TACTUS_ROLE_OUTPUT && o++ == output)
-			name = model->domain->signals[s].name;
-	const char *suffix = name ? strrchr(name, '_') : NULL;
+	if (!name)
+		name = tactus_domain_signal(model->domain, TACTUS_ROLE_OUTPUT, output)->name;
+	const char *suffix = strrchr(name, '_');
 	return suffix ? suffix + 1 : "";
 }
 

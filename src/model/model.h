@@ -56,8 +56,11 @@ int tactus_model_add_effect(tactus_model *model, const tactus_effect *effect);
 tactus_model_channel_data *tactus_model_find_channel(const tactus_model *model, int channel);
 /* A chain for one channel of a forward model. */
 int tactus_model_chain(const tactus_model *model, const tactus_model_channel_data *channel, tactus_chain **chain);
+/* The i-th signal of a role in a domain's table, NULL past the last: output 1, say. */
+const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tactus_role role, size_t i);
 /* Names of an estimator's parameters, NULL-terminated. */
 const char *const *tactus_estimator_parameters(enum tactus_form form);
+const char *const *tactus_estimator_units(enum tactus_form form);
 const char *tactus_form_name(enum tactus_form form);
 /* The form of that name, or -1. */
 int tactus_form_find(const char *name);
