@@ -6,11 +6,9 @@
 #include "core/toml.h"
 #include "model/model.h"
 
-* /
-
-	/* `key = 1.5` or `key = { value = 1.5, standard_error = 0.1, unit = "N" }`; 1 if it was there. */
-	static int read_value(const tactus_toml_node *table, const char *key, const char *unit,
-						  const tactus_parameter *info, double *value, double *std)
+/* `key = 1.5` or `key = { value = 1.5, standard_error = 0.1, unit = "N" }`; 1 if it was there. */
+static int read_value(const tactus_toml_node *table, const char *key, const char *unit, const tactus_parameter *info,
+					  double *value, double *std)
 {
 	double read = NAN, read_std = NAN;
 	int status;

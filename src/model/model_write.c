@@ -10,10 +10,8 @@
 #include "core/core.h"
 #include "model/model.h"
 
-* /
-
-	/* The shortest text of a number, as a TOML float (an integer's text gets a ".0", so that −0 and type survive). */
-	static void put_number(FILE *file, double value)
+/* The shortest text of a number, as a TOML float (an integer's text gets a ".0", so that −0 and type survive). */
+static void put_number(FILE *file, double value)
 {
 	char text[TACTUS_NUMBER_SIZE];
 	tactus_format_number(value, text);
