@@ -1,6 +1,7 @@
-# tactus: everything is a target of this file. `make help` lists them.
+# tactus: everything is a target of this file. `make help` lists them; `make V=1` shows the commands.
 SHELL := /bin/sh
 .DEFAULT_GOAL := all
+.DELETE_ON_ERROR:
 
 VERSION := $(shell sed -n 's/^.define TACTUS_VERSION "\(.*\)"/\1/p' include/tactus/version.h)
 SOVERSION := 0
@@ -15,8 +16,12 @@ DATADIR ?= $(PREFIX)/share
 MANDIR ?= $(DATADIR)/man
 COMPLETIONDIR ?= $(DATADIR)/bash-completion/completions
 
-CC ?= gcc
-CXX ?= g++
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+ifeq ($(origin CXX),default)
+CXX := g++
+endif
 OPT ?= -O2 -g
 WARN := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-unknown-warning-option
 # `make WERROR=1` turns warnings into errors; CI does.
@@ -26,13 +31,16 @@ endif
 SANITIZE ?=
 PACKAGES := jansson tomlplusplus
 PKG_CFLAGS := $(shell pkg-config --cflags $(PACKAGES) eigen3 2>/dev/null)
-PKG_LIBS := $(shell pkg-config --libs $(PACKAGES) 2>/dev/null)
+PKG_LIBS := $(strip $(shell pkg-config --libs $(PACKAGES) 2>/dev/null))
 
-CPPFLAGS += -Iinclude -D_GNU_SOURCE
+CPPFLAGS_ALL := -Iinclude -D_GNU_SOURCE $(CPPFLAGS)
 COMMON := $(OPT) $(SANITIZE) -fvisibility=hidden -fPIC -pthread -ffp-contract=off
 CFLAGS_ALL := -std=c17 $(WARN) -Wstrict-prototypes -Wmissing-prototypes $(COMMON) $(CFLAGS)
 CXXFLAGS_ALL := -std=c++17 $(WARN) -Wno-missing-declarations $(COMMON) $(CXXFLAGS)
-LDLIBS_LIB := $(PKG_LIBS) -lceres -lglog -lstdc++ -lm -pthread
+LIB_CFLAGS := -Isrc $(PKG_CFLAGS)
+LIB_CXXFLAGS := -Isrc $(patsubst -I%,-isystem %,$(PKG_CFLAGS)) -isystem /usr/include/eigen3
+# What a program that links the static library needs besides.
+LDLIBS_PRIVATE := $(PKG_LIBS) -lceres -lglog -lstdc++ -lm -pthread
 DEPFLAGS = -MMD -MP
 
 LIB_C := $(wildcard src/*.c src/*/*.c src/*/*/*.c src/*/*/*/*.c)
@@ -42,47 +50,244 @@ CLI_C := $(wildcard cli/*.c)
 CLI_OBJ := $(CLI_C:%.c=$(BUILD)/%.o)
 UNIT_C := $(wildcard tests/unit/test_*.c)
 UNIT := $(UNIT_C:tests/unit/%.c=$(BUILD)/tests/%)
+HEADERS := $(wildcard include/tactus/*.h)
+PROFILES := $(wildcard src/device/*.toml)
 
+PROGRAM := $(BUILD)/tactus
 SHARED := $(BUILD)/libtactus.so
+SONAME := libtactus.so.$(SOVERSION)
 STATIC := $(BUILD)/libtactus.a
 
+# Short lines (`CC src/…`), or the commands themselves with V=1.
+ifeq ($(V),)
+say = @echo '  $(1)	$@';
+else
+say =
+endif
+# Goals that go on for a while run in parallel even when nobody says -j; an own -j is respected.
+NPROC := $(shell nproc 2>/dev/null || echo 2)
+parallel = $(MAKE) --no-print-directory $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(NPROC))
+
 .PHONY: all
-all: $(BUILD)/tactus $(SHARED) $(STATIC) ## build the program and the libraries in build/
+all: $(PROGRAM) $(SHARED) $(STATIC) $(BUILD)/tactus.pc ## build the program and the libraries in build/
+
+# ---- building ----------------------------------------------------------------------------------------------------
+
+# Rewritten when the flags change, so that what was built with others is built again.
+FLAGS := $(CC) $(CXX) $(CPPFLAGS_ALL) $(CFLAGS_ALL) $(CXXFLAGS_ALL) $(LIB_CFLAGS) $(LDFLAGS) $(LDLIBS_PRIVATE)
+# The list of objects likewise: a source that was removed leaves the libraries.
+$(BUILD)/flags: CONTENT = $(FLAGS)
+$(BUILD)/objects: CONTENT = $(LIB_OBJ) $(CLI_OBJ)
+$(BUILD)/flags $(BUILD)/objects: FORCE
+	@mkdir -p $(@D)
+	@echo '$(CONTENT)' | cmp -s - $@ || echo '$(CONTENT)' >$@
+.PHONY: FORCE
+FORCE:
+
+# Says once what is missing instead of a page of compiler errors.
+$(BUILD)/packages: Makefile
+	@mkdir -p $(@D)
+	@pkg-config --exists $(PACKAGES) eigen3 || { echo 'Libraries are missing: run scripts/setup first.' >&2; exit 1; }
+	@touch $@
+
+$(LIB_OBJ) $(CLI_OBJ): $(BUILD)/flags | $(BUILD)/packages
 
 $(BUILD)/src/%.o: src/%.c
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) -Isrc $(PKG_CFLAGS) $(CFLAGS_ALL) $(DEPFLAGS) -c $< -o $@
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(LIB_CFLAGS) $(CFLAGS_ALL) $(DEPFLAGS) -c $< -o $@
 
 $(BUILD)/src/%.o: src/%.cpp
 	@mkdir -p $(@D)
-	$(CXX) $(CPPFLAGS) -Isrc $(patsubst -I%,-isystem %,$(PKG_CFLAGS)) -isystem /usr/include/eigen3 $(CXXFLAGS_ALL) $(DEPFLAGS) -c $< -o $@
+	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(LIB_CXXFLAGS) $(CXXFLAGS_ALL) $(DEPFLAGS) -c $< -o $@
 
+# The program sees the public headers only, as any other user of the library would.
 $(BUILD)/cli/%.o: cli/%.c
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) -Icli $(CFLAGS_ALL) $(DEPFLAGS) -c $< -o $@
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) -Icli $(CFLAGS_ALL) $(DEPFLAGS) -c $< -o $@
 
-$(STATIC): $(LIB_OBJ)
+$(STATIC): $(LIB_OBJ) $(BUILD)/objects
 	@rm -f $@
-	$(AR) rcs $@ $^
+	$(call say,AR)$(AR) rcs $@ $(LIB_OBJ)
 
-$(SHARED).$(SOVERSION): $(LIB_OBJ) src/tactus.map
-	$(CXX) $(OPT) $(SANITIZE) -shared -Wl,-soname,libtactus.so.$(SOVERSION) -Wl,--version-script=src/tactus.map -Wl,--no-undefined -o $@ $(LIB_OBJ) $(LDFLAGS) $(LDLIBS_LIB)
+$(BUILD)/$(SONAME): $(LIB_OBJ) $(BUILD)/objects src/tactus.map
+	$(call say,LINK)$(CXX) $(OPT) $(SANITIZE) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=src/tactus.map \
+		-Wl,--no-undefined -o $@ $(LIB_OBJ) $(LDFLAGS) $(LDLIBS_PRIVATE)
 
-$(SHARED): $(SHARED).$(SOVERSION)
-	ln -sf $(<F) $@
+$(SHARED): $(BUILD)/$(SONAME)
+	@ln -sf $(<F) $@
 
-# The program links the shared library, as any other user of it would.
-$(BUILD)/tactus: $(CLI_OBJ) $(SHARED)
-	$(CC) $(OPT) $(SANITIZE) -o $@ $(CLI_OBJ) $(LDFLAGS) -L$(BUILD) -ltactus -Wl,-rpath,'$$ORIGIN' -Wl,-rpath,'$$ORIGIN/../lib' -lm -pthread
+LINK_PROGRAM = $(CC) $(OPT) $(SANITIZE) $(CLI_OBJ) $(LDFLAGS) -L$(BUILD) -ltactus -lm -pthread
+$(PROGRAM): $(CLI_OBJ) $(SHARED) $(BUILD)/objects
+	$(call say,LINK)$(LINK_PROGRAM) -Wl,-rpath,'$$ORIGIN' -o $@
 
 # Unit tests link the static library: they may look inside.
 $(BUILD)/tests/%: tests/unit/%.c $(STATIC)
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) -Isrc -Itests/unit $(PKG_CFLAGS) $(CFLAGS_ALL) $(DEPFLAGS) $< -o $@ $(STATIC) $(LDFLAGS) -lcmocka $(LDLIBS_LIB)
+	$(call say,TEST)$(CC) $(CPPFLAGS_ALL) $(LIB_CFLAGS) -Itests/unit $(CFLAGS_ALL) $(DEPFLAGS) $< -o $@ $(STATIC) \
+		$(LDFLAGS) -lcmocka $(LDLIBS_PRIVATE)
+
+# `pkg-config --libs tactus` links the shared library alone, `--static` adds what it is made of.
+define PC
+prefix=$(PREFIX)
+libdir=$(LIBDIR)
+includedir=$(INCLUDEDIR)
+
+Name: tactus
+Description: Trustworthy readings from low-cost piezoresistive force sensors
+Version: $(VERSION)
+Cflags: -I$${includedir}
+Libs: -L$${libdir} -ltactus
+Libs.private: $(LDLIBS_PRIVATE)
+endef
+export PC
+$(BUILD)/tactus.pc: FORCE
+	@mkdir -p $(@D)
+	@printf '%s\n' "$$PC" | cmp -s - $@ || printf '%s\n' "$$PC" >$@
+
+# ---- trying and testing --------------------------------------------------------------------------------------------
+
+.PHONY: demo
+demo: ## the simulated bench from scan to newtons (installs what is missing)
+	@scripts/setup
+	@$(parallel) all
+	@BUILD=$(BUILD) scripts/demo
+
+.PHONY: test
+test: ## build and run all tests (installs what is missing)
+	@scripts/setup
+	@$(parallel) all tests
+	@scripts/run-tests $(BUILD)
+
+.PHONY: tests
+tests: $(UNIT)
 
 .PHONY: unit
-unit: $(UNIT) ## build and run the unit tests
-	@for t in $(UNIT); do $$t || exit 1; done
+unit: $(UNIT) ## the unit tests (cmocka)
+	@scripts/run-tests $(BUILD) unit
+
+.PHONY: cli-test
+cli-test: all ## the tests of the command line (bats)
+	@scripts/run-tests $(BUILD) cli
+
+.PHONY: install-test
+install-test: all ## build C and C++ programs against an installed copy and run them
+	@scripts/run-tests $(BUILD) install
+
+.PHONY: published
+published: all ## error reductions on the simulated bench beside the paper's Table I
+	@BUILD=$(BUILD) scripts/published
+
+.PHONY: bench
+bench: ## speed against Miller, pandas, numpy and scipy, written to BENCHMARKS.md
+	@scripts/setup --check
+	@$(parallel) all
+	@BUILD=$(BUILD) scripts/bench
+
+# ---- checking ------------------------------------------------------------------------------------------------------
+
+SOURCES_C := $(LIB_C) $(CLI_C) $(UNIT_C) $(wildcard tests/install/*.c)
+SOURCES := $(SOURCES_C) $(LIB_CXX) $(HEADERS) \
+	$(wildcard cli/*.h src/*/*.h src/*/*/*.h src/*/*/*/*.h tests/*/*.h tests/*/*.cpp)
+SCRIPTS := $(shell grep -lE '^\#!/bin/(ba)?sh|^\#!/usr/bin/env bash' scripts/* .ci/run 2>/dev/null)
+
+.PHONY: check
+check: ## formatting, clang-tidy, cppcheck, shellcheck, headers; any finding is an error
+	@scripts/setup --check
+	@$(parallel) check-format check-scripts headers check-cppcheck check-tidy
+
+.PHONY: check-format
+check-format:
+	@clang-format --dry-run -Werror $(SOURCES)
+
+.PHONY: check-scripts
+check-scripts:
+	@shellcheck $(SCRIPTS)
+
+# One mark per file, so that an unchanged file is not read again.
+TIDY := $(SOURCES_C:%=$(BUILD)/tidy/%) $(LIB_CXX:%=$(BUILD)/tidy/%)
+.PHONY: check-tidy
+check-tidy: $(TIDY)
+
+TIDY_DEPENDS := .clang-tidy $(HEADERS) $(wildcard src/*/*.h cli/*.h)
+$(BUILD)/tidy/%.c: %.c $(TIDY_DEPENDS)
+	@mkdir -p $(@D)
+	$(call say,TIDY)clang-tidy --quiet $< -- -std=c17 $(CPPFLAGS_ALL) $(LIB_CFLAGS) -Icli -Wall -Wextra 2>$@.log || { cat $@.log; exit 1; }
+	@touch $@
+
+$(BUILD)/tidy/%.cpp: %.cpp $(TIDY_DEPENDS)
+	@mkdir -p $(@D)
+	$(call say,TIDY)clang-tidy --quiet $< -- -std=c++17 $(CPPFLAGS_ALL) $(LIB_CXXFLAGS) -Wall -Wextra 2>$@.log || { cat $@.log; exit 1; }
+	@touch $@
+
+.PHONY: check-cppcheck
+check-cppcheck:
+	@mkdir -p $(BUILD)/cppcheck
+	@cppcheck --quiet --enable=warning,performance,portability --inline-suppr --error-exitcode=1 --std=c17 \
+		--cppcheck-build-dir=$(BUILD)/cppcheck --suppress=missingIncludeSystem -D__GNUC__=12 -Iinclude -Isrc -Icli $(LIB_C) $(CLI_C)
+
+# Every public header compiles alone.
+.PHONY: headers
+headers: ## each public header alone as C11, C17 and C++17, -pedantic -Werror
+	@for header in $(HEADERS:include/%=%); do \
+		for language in 'c -std=c11' 'c -std=c17' 'c++ -std=c++17'; do \
+			echo "#include <$$header>" | $(CC) -Iinclude -x $$language -Wall -Wextra -pedantic -Werror -fsyntax-only - || exit 1; \
+		done; \
+	done
+
+.PHONY: asan
+asan: ## unit and command-line tests under AddressSanitizer and UBSan
+	@$(parallel) BUILD=$(BUILD)/asan OPT='-O1 -g' WERROR= \
+		SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer' sanitized
+
+.PHONY: tsan
+tsan: ## the tests that use threads under ThreadSanitizer
+	@$(parallel) BUILD=$(BUILD)/tsan OPT='-O1 -g' WERROR= SANITIZE='-fsanitize=thread' threaded
+
+.PHONY: sanitized
+sanitized: all tests
+	@scripts/run-tests $(BUILD) unit cli
+
+THREADED := $(filter %_threads %_fit,$(UNIT))
+.PHONY: threaded
+threaded: $(THREADED)
+	@scripts/run-tests $(BUILD) $(THREADED)
+
+.PHONY: coverage
+coverage: ## run unit and command-line tests with gcov and print what they reach
+	@scripts/setup --check
+	@$(parallel) BUILD=$(BUILD)/coverage OPT='-O0 -g' WERROR= SANITIZE=--coverage sanitized
+	@gcovr --root . --filter 'src/' --filter 'cli/' --object-directory $(BUILD)/coverage $(BUILD)/coverage
+
+# ---- documents and installation ------------------------------------------------------------------------------------
+
+.PHONY: docs
+docs: all ## man pages and bash completion, made by the program from its option tables
+	@mkdir -p $(BUILD)/man $(BUILD)/completion
+	@$(PROGRAM) --man $(BUILD)/man
+	@$(PROGRAM) --completion >$(BUILD)/completion/tactus
+
+# The installed program looks for the library where it was installed, relative to itself.
+.PHONY: install
+install: docs ## install to PREFIX (default /usr/local), under DESTDIR if that is set
+	@install -d $(addprefix $(DESTDIR),$(BINDIR) $(LIBDIR)/pkgconfig $(INCLUDEDIR)/tactus $(DATADIR)/tactus $(MANDIR) $(COMPLETIONDIR))
+	@$(LINK_PROGRAM) -Wl,-rpath,'$$ORIGIN/$(shell realpath -m --relative-to=$(BINDIR) $(LIBDIR))' -o $(DESTDIR)$(BINDIR)/tactus
+	@install -m 644 $(BUILD)/$(SONAME) $(DESTDIR)$(LIBDIR)/libtactus.so.$(VERSION)
+	@ln -sf libtactus.so.$(VERSION) $(DESTDIR)$(LIBDIR)/$(SONAME)
+	@ln -sf $(SONAME) $(DESTDIR)$(LIBDIR)/libtactus.so
+	@install -m 644 $(STATIC) $(DESTDIR)$(LIBDIR)/
+	@install -m 644 $(BUILD)/tactus.pc $(DESTDIR)$(LIBDIR)/pkgconfig/
+	@install -m 644 $(HEADERS) $(DESTDIR)$(INCLUDEDIR)/tactus/
+	@$(if $(PROFILES),install -m 644 $(PROFILES) $(DESTDIR)$(DATADIR)/tactus/)
+	@for page in $(BUILD)/man/*; do install -D -m 644 -t $(DESTDIR)$(MANDIR)/man$${page##*.} $$page; done
+	@install -m 644 $(BUILD)/completion/tactus $(DESTDIR)$(COMPLETIONDIR)/
+
+.PHONY: uninstall
+uninstall: docs ## remove what install put there, and nothing else
+	@rm -f $(addprefix $(DESTDIR),$(BINDIR)/tactus $(COMPLETIONDIR)/tactus $(LIBDIR)/pkgconfig/tactus.pc \
+		$(addprefix $(LIBDIR)/,libtactus.so.$(VERSION) $(SONAME) libtactus.so libtactus.a) \
+		$(HEADERS:include/%=$(INCLUDEDIR)/%) $(PROFILES:src/device/%=$(DATADIR)/tactus/%))
+	@for page in $(BUILD)/man/*; do rm -f $(DESTDIR)$(MANDIR)/man$${page##*.}/$${page##*/}; done
+	@for d in $(INCLUDEDIR)/tactus $(DATADIR)/tactus; do rmdir $(DESTDIR)$$d 2>/dev/null || true; done
 
 .PHONY: clean
 clean: ## remove build/
@@ -90,6 +295,7 @@ clean: ## remove build/
 
 .PHONY: help
 help: ## list the targets
-	@sed -n 's/^\([a-z_-]*\):.*## \(.*\)/  \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 16
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
+	@echo 'Variables: BUILD=$(BUILD) PREFIX=$(PREFIX) DESTDIR CC CXX OPT CFLAGS WERROR=1 V=1'
 
 -include $(LIB_OBJ:.o=.d) $(CLI_OBJ:.o=.d) $(UNIT:%=%.d)
