@@ -34,7 +34,12 @@ enum tactus_parameter_kind {
 
 typedef struct {
 	const char *name;
-	const char *unit; /* "output0", "output1" where it has the unit of that output (and scales with its range) */
+	/*
+	 * "output0", "output1" where it has the unit of that output, "N" where it has the input's: start and scale are then
+	 * those for a range of 1, to be multiplied by the range (divided where the unit is "1/…"). Likewise the start of a
+	 * TACTUS_CONSTANT: the value to state for that range. Every other unit: as they are.
+	 */
+	const char *unit;
 	const char *summary;
 	double neutral, lower, upper;
 	double start; /* where a fit starts: not neutral */
@@ -157,6 +162,7 @@ enum tactus_readout_signal {
 	READOUT_TEMPERATURE, /* temperature_degC, fill 25 */
 	READOUT_Y_RE,        /* internal: admittance seen at the amplifier's input, set on entering `load` */
 	READOUT_Y_IM,
+	READOUT_RG,   /* internal: the amplifier's resistor, ohm, set on entering `amplifier` */
 	READOUT_H_RE, /* internal: voltage gain with the inversion taken out (Rg·Y), set on entering `amplifier` */
 	READOUT_H_IM,
 	READOUT_THETA,     /* internal: phase before the fold, set on entering `detector` */
