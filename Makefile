@@ -260,15 +260,35 @@ coverage: ## run unit and command-line tests with gcov and print what they reach
 
 # ---- documents and installation ------------------------------------------------------------------------------------
 
+# Pages that no option table can hold (the language of protocols) are written by hand beside the code they describe.
+COMMANDS := $(patsubst cli/cmd_%.c,%,$(wildcard cli/cmd_*.c))
+MAN := $(BUILD)/man/tactus.1 $(COMMANDS:%=$(BUILD)/man/tactus-%.1) \
+	$(patsubst %,$(BUILD)/man/%,$(notdir $(wildcard src/*/*.7)))
+COMPLETION := $(BUILD)/completion/tactus
+
 .PHONY: docs
-docs: all ## man pages and bash completion, made by the program from its option tables
-	@mkdir -p $(BUILD)/man $(BUILD)/completion
-	@$(PROGRAM) --man $(BUILD)/man
-	@$(PROGRAM) --completion >$(BUILD)/completion/tactus
+docs: $(MAN) $(COMPLETION) ## man pages and bash completion, made by the program from its option tables
+
+$(BUILD)/man/tactus.1: $(PROGRAM)
+	@mkdir -p $(@D)
+	@$(PROGRAM) --man >$@
+
+$(BUILD)/man/tactus-%.1: $(PROGRAM)
+	@mkdir -p $(@D)
+	@$(PROGRAM) --man $* >$@
+
+vpath %.7 $(sort $(dir $(wildcard src/*/*.7)))
+$(BUILD)/man/%.7: %.7
+	@mkdir -p $(@D)
+	@cp $< $@
+
+$(COMPLETION): $(PROGRAM)
+	@mkdir -p $(@D)
+	@$(PROGRAM) --completion bash >$@
 
 # The installed program looks for the library where it was installed, relative to itself.
 .PHONY: install
-install: docs ## install to PREFIX (default /usr/local), under DESTDIR if that is set
+install: all docs ## install to PREFIX (default /usr/local), under DESTDIR if that is set
 	@install -d $(addprefix $(DESTDIR),$(BINDIR) $(LIBDIR)/pkgconfig $(INCLUDEDIR)/tactus $(DATADIR)/tactus $(MANDIR) $(COMPLETIONDIR))
 	@$(LINK_PROGRAM) -Wl,-rpath,'$$ORIGIN/$(shell realpath -m --relative-to=$(BINDIR) $(LIBDIR))' -o $(DESTDIR)$(BINDIR)/tactus
 	@install -m 644 $(BUILD)/$(SONAME) $(DESTDIR)$(LIBDIR)/libtactus.so.$(VERSION)
@@ -278,15 +298,15 @@ install: docs ## install to PREFIX (default /usr/local), under DESTDIR if that i
 	@install -m 644 $(BUILD)/tactus.pc $(DESTDIR)$(LIBDIR)/pkgconfig/
 	@install -m 644 $(HEADERS) $(DESTDIR)$(INCLUDEDIR)/tactus/
 	@$(if $(PROFILES),install -m 644 $(PROFILES) $(DESTDIR)$(DATADIR)/tactus/)
-	@for page in $(BUILD)/man/*; do install -D -m 644 -t $(DESTDIR)$(MANDIR)/man$${page##*.} $$page; done
-	@install -m 644 $(BUILD)/completion/tactus $(DESTDIR)$(COMPLETIONDIR)/
+	@for page in $(MAN); do install -D -m 644 -t $(DESTDIR)$(MANDIR)/man$${page##*.} $$page; done
+	@install -m 644 $(COMPLETION) $(DESTDIR)$(COMPLETIONDIR)/
 
 .PHONY: uninstall
-uninstall: docs ## remove what install put there, and nothing else
+uninstall: all docs ## remove what install put there, and nothing else
 	@rm -f $(addprefix $(DESTDIR),$(BINDIR)/tactus $(COMPLETIONDIR)/tactus $(LIBDIR)/pkgconfig/tactus.pc \
 		$(addprefix $(LIBDIR)/,libtactus.so.$(VERSION) $(SONAME) libtactus.so libtactus.a) \
 		$(HEADERS:include/%=$(INCLUDEDIR)/%) $(PROFILES:src/device/%=$(DATADIR)/tactus/%))
-	@for page in $(BUILD)/man/*; do rm -f $(DESTDIR)$(MANDIR)/man$${page##*.}/$${page##*/}; done
+	@for page in $(MAN); do rm -f $(DESTDIR)$(MANDIR)/man$${page##*.}/$${page##*/}; done
 	@for d in $(INCLUDEDIR)/tactus $(DATADIR)/tactus; do rmdir $(DESTDIR)$$d 2>/dev/null || true; done
 
 .PHONY: clean
