@@ -12,7 +12,9 @@
 extern "C" {
 #endif
 
-/* ---- metadata: ordered `key: value` pairs ------------------------------------------------------------------- */
+/*
+ * ---- metadata: ordered `key: value` pairs. A comment line of a file is a pair whose key is "", and a key that a file
+ * says twice is there twice: both are written back. ------------------------------------------------------------- */
 
 typedef struct tactus_metadata tactus_metadata;
 
@@ -21,7 +23,7 @@ TACTUS_API tactus_metadata *tactus_metadata_new(void);
 TACTUS_API void tactus_metadata_free(tactus_metadata *metadata);
 /** Sets (replaces, or appends at the end) one pair; both strings are copied. A NULL value removes the key. */
 TACTUS_API int tactus_metadata_set(tactus_metadata *metadata, const char *key, const char *value);
-/** The same with the shortest text of a number. */
+/** The same with the shortest text of a number; NaN removes the key. */
 TACTUS_API int tactus_metadata_set_number(tactus_metadata *metadata, const char *key, double value);
 /** The value, or NULL. Owned by the list, valid until it changes. */
 TACTUS_API const char *tactus_metadata_get(const tactus_metadata *metadata, const char *key);
