@@ -27,7 +27,7 @@ static inline uint64_t tactus_random_bits(uint64_t seed, uint64_t stream, uint64
 /* Uniform in the open interval (0, 1). */
 static inline double tactus_random_uniform(uint64_t seed, uint64_t stream, uint64_t index)
 {
-	return ((double)(tactus_random_bits(seed, stream, index) >> 11) + 0.5) * 0x1p-53;
+	return ((double)(tactus_random_bits(seed, stream, index) >> 12) + 0.5) * 0x1p-52;
 }
 
 /* Normal with mean 0 and variance 1. */

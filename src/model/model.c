@@ -253,7 +253,10 @@ const char *tactus_model_unit(const tactus_model *model, const char *unit)
 	if (!name)
 		name = tactus_domain_signal(model->domain, TACTUS_ROLE_OUTPUT, output)->name;
 	const char *suffix = strrchr(name, '_');
-	return suffix ? suffix + 1 : "";
+	if (!suffix || unit[7] == '\0')
+		return suffix ? suffix + 1 : "";
+	/* "output0/N", a sensitivity: a foreign column's is left without a unit */
+	return strcmp(suffix, "_S") == 0 ? "S/N" : strcmp(suffix, "_F") == 0 ? "F/N" : "";
 }
 
 size_t tactus_model_parameters(const tactus_model *model, size_t channel_index)
