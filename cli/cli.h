@@ -61,8 +61,13 @@ struct cli_command {
 		"overwrite", 0, CLI_FLAG, NULL, NULL, "replace FILE if it exists"                                              \
 	}
 #define CLI_OPTIONS_FORMAT                                                                                             \
+	{"format", 0, CLI_CHOICE, "FORMAT", "csv|jsonl", "how records are written (default csv)"},                         \
 	{                                                                                                                  \
-		"format", 0, CLI_CHOICE, "FORMAT", "csv|jsonl", "how records are written (default csv)"                        \
+		"json", 0, CLI_FLAG, NULL, NULL, "the same as --format jsonl"                                                  \
+	}
+#define CLI_OPTION_MODEL_FILE                                                                                          \
+	{                                                                                                                  \
+		"model-file", 'm', CLI_FILE, "MODEL", NULL, "the model file, as `tactus fit` writes it"                        \
 	}
 #define CLI_OPTIONS_READ                                                                                               \
 	{"delimiter", 0, CLI_STRING, "CHAR", NULL, "field separator of the input (default: told by its header)"},          \
@@ -88,6 +93,11 @@ const char *cli_argument(const struct cli *cli, size_t i); /* NULL past the last
 const char *cli_recording(const struct cli *cli, size_t i);
 bool cli_quiet(const struct cli *cli);
 bool cli_verbose(const struct cli *cli);
+/*
+ * Channels in the order given, from "1-8", "3,1,2" or "8-5,1"; allocated, freed by the caller; NULL and 0 where the
+ * option was not given. 0, or an exit status with the message printed.
+ */
+int cli_channels(const struct cli *cli, const char *option, int **channels, size_t *count);
 
 /* Reading options of CLI_OPTIONS_READ, writer flags and format of CLI_OPTIONS_OUTPUT and CLI_OPTIONS_FORMAT. */
 tactus_read_options cli_read_options(const struct cli *cli);

@@ -8,6 +8,7 @@
 
 #include "internal.h"
 
+enum { CHANNEL_MAX = 4096 };
 enum { LONG_BASE = 256 }; /* getopt's value of option i is LONG_BASE + i, out of the way of letters */
 
 const struct cli_option cli_common_options[] = {
@@ -292,6 +293,50 @@ bool cli_verbose(const struct cli *cli)
 	return cli_has(cli, "verbose") && !cli_quiet(cli);
 }
 
+/* "A" or "A-B" at *text as channels first … last (either way round); false if it is neither. */
+static bool read_range(const char **text, long *first, long *last)
+{
+	char *end;
+	if (**text < '0' || **text > '9')
+		return false;
+	*first = *last = strtol(*text, &end, 10);
+	if (*end == '-' && end[1] >= '0' && end[1] <= '9')
+		*last = strtol(end + 1, &end, 10);
+	*text = end;
+	return *first <= CHANNEL_MAX && *last <= CHANNEL_MAX && (!*end || (*end == ',' && end[1]));
+}
+
+int cli_channels(const struct cli *cli, const char *option, int **channels, size_t *count)
+{
+	const char *text = cli_string(cli, option, "");
+	int *list = NULL;
+	size_t n = 0;
+	long first, last;
+	while (*text) {
+		if (!read_range(&text, &first, &last)) {
+			free(list);
+			cli_error(cli, CLI_USAGE, "--%s: '%s' is no list of channels such as 1-8 or 3,1,2", option,
+					  cli_string(cli, option, ""));
+			return try_help(cli);
+		}
+		int *longer = realloc(list, (n + (size_t)labs(last - first) + 1) * sizeof *list);
+		if (!longer) {
+			free(list);
+			return cli_error(cli, CLI_FAILED, "out of memory");
+		}
+		list = longer;
+		for (long c = first;; c += first <= last ? 1 : -1) {
+			list[n++] = (int)c;
+			if (c == last)
+				break;
+		}
+		text += *text == ',';
+	}
+	*channels = list;
+	*count = n;
+	return 0;
+}
+
 tactus_read_options cli_read_options(const struct cli *cli)
 {
 	const char *delimiter = cli_string(cli, "delimiter", "");
@@ -304,7 +349,7 @@ tactus_read_options cli_read_options(const struct cli *cli)
 
 int cli_open_writer(const struct cli *cli, tactus_writer **writer)
 {
-	bool json = !strcmp(cli_string(cli, "format", "csv"), "jsonl");
+	bool json = cli_has(cli, "json") || !strcmp(cli_string(cli, "format", "csv"), "jsonl");
 	return tactus_writer_open(cli_string(cli, "output-file", NULL), json ? TACTUS_FORMAT_JSON_LINES : TACTUS_FORMAT_CSV,
 							  cli_has(cli, "overwrite") ? TACTUS_WRITE_OVERWRITE : 0, writer);
 }

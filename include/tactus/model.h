@@ -94,6 +94,33 @@ TACTUS_API tactus_parameter_value tactus_model_parameter(const tactus_model *mod
 TACTUS_API int tactus_model_set(tactus_model *model, size_t channel_index, const char *effect, const char *name,
 								double value, double standard_error);
 
+/** "forward", "average", "weighted", "linear" or "network". Static. */
+TACTUS_API const char *tactus_form_name(enum tactus_form form);
+/** The column that plays the domain's input; owned by the model. */
+TACTUS_API const char *tactus_model_input(const tactus_model *model);
+
+/** What the calibration of a channel left behind; NaN (no samples: 0) where it is not known. */
+typedef struct {
+	size_t samples;
+	double rmse_N, cv_rmse_N;    /**< error in newtons, in sample and by blocked cross-validation */
+	double force_std_N;          /**< of an estimator's force */
+	double input_min, input_max; /**< range of the input that it is valid in */
+} tactus_channel_facts;
+
+TACTUS_API tactus_channel_facts tactus_model_facts(const tactus_model *model, size_t channel_index);
+
+/** A reading that a model yields (forward) or needs (estimator), and what is known of it in one channel. */
+typedef struct {
+	const char *output;              /**< the domain's name, e.g. "conductance_S" */
+	const char *column;              /**< the column that plays it */
+	const char *mode;                /**< "dc" or "ac" where it belongs to such rows, else "" */
+	double residual_std;             /**< about the forward model, in its unit; NaN where not known */
+	double reading_min, reading_max; /**< range in the calibration; NaN where not known */
+} tactus_reading_facts;
+
+TACTUS_API size_t tactus_model_readings(const tactus_model *model);
+TACTUS_API tactus_reading_facts tactus_model_reading(const tactus_model *model, size_t channel_index, size_t i);
+
 /* ---- simulate: inputs → outputs, block by block --------------------------------------------------------------------
  */
 

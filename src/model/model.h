@@ -61,7 +61,6 @@ const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tact
 /* Names of an estimator's parameters, NULL-terminated. */
 const char *const *tactus_estimator_parameters(enum tactus_form form);
 const char *const *tactus_estimator_units(enum tactus_form form);
-const char *tactus_form_name(enum tactus_form form);
 /* The form of that name, or -1. */
 int tactus_form_find(const char *name);
 /* True if the form uses the domain's base equations. */
