@@ -51,7 +51,7 @@ CLI_OBJ := $(CLI_C:%.c=$(BUILD)/%.o)
 UNIT_C := $(wildcard tests/unit/test_*.c)
 UNIT := $(UNIT_C:tests/unit/%.c=$(BUILD)/tests/%)
 HEADERS := $(wildcard include/tactus/*.h)
-PROFILES := $(wildcard src/device/*.toml)
+PROFILES := $(wildcard src/device/*/*.toml)
 
 PROGRAM := $(BUILD)/tactus
 SHARED := $(BUILD)/libtactus.so
@@ -180,12 +180,17 @@ published: all ## error reductions on the simulated bench beside the paper's Tab
 .PHONY: bench
 bench: ## speed against Miller, pandas, numpy and scipy, written to BENCHMARKS.md
 	@scripts/setup --check
-	@$(parallel) all
+	@$(parallel) all $(BUILD)/bench_loops.so
 	@BUILD=$(BUILD) scripts/bench
+
+# Loops that the benchmarks call from Python; the static library, because some of them look inside.
+$(BUILD)/bench_loops.so: tests/peers/bench_loops.c $(STATIC)
+	$(call say,LINK)$(CC) $(CPPFLAGS_ALL) -Isrc -std=c17 $(WARN) -O3 -march=native -ffp-contract=off -fPIC -shared $< -o $@ $(STATIC) \
+		$(LDFLAGS) $(LDLIBS_PRIVATE)
 
 # ---- checking ------------------------------------------------------------------------------------------------------
 
-SOURCES_C := $(LIB_C) $(CLI_C) $(UNIT_C) $(wildcard tests/install/*.c)
+SOURCES_C := $(LIB_C) $(CLI_C) $(UNIT_C) $(wildcard tests/install/*.c tests/peers/*.c)
 SOURCES := $(SOURCES_C) $(LIB_CXX) $(HEADERS) \
 	$(wildcard cli/*.h src/*/*.h src/*/*/*.h src/*/*/*/*.h tests/*/*.h tests/*/*.cpp)
 SCRIPTS := $(shell grep -lE '^\#!/bin/(ba)?sh|^\#!/usr/bin/env bash' scripts/* .ci/run 2>/dev/null)
@@ -305,7 +310,7 @@ install: all docs ## install to PREFIX (default /usr/local), under DESTDIR if th
 uninstall: all docs ## remove what install put there, and nothing else
 	@rm -f $(addprefix $(DESTDIR),$(BINDIR)/tactus $(COMPLETIONDIR)/tactus $(LIBDIR)/pkgconfig/tactus.pc \
 		$(addprefix $(LIBDIR)/,libtactus.so.$(VERSION) $(SONAME) libtactus.so libtactus.a) \
-		$(HEADERS:include/%=$(INCLUDEDIR)/%) $(PROFILES:src/device/%=$(DATADIR)/tactus/%))
+		$(HEADERS:include/%=$(INCLUDEDIR)/%) $(addprefix $(DATADIR)/tactus/,$(notdir $(PROFILES))))
 	@for page in $(MAN); do rm -f $(DESTDIR)$(MANDIR)/man$${page##*.}/$${page##*/}; done
 	@for d in $(INCLUDEDIR)/tactus $(DATADIR)/tactus; do rmdir $(DESTDIR)$$d 2>/dev/null || true; done
 

@@ -1,0 +1,55 @@
+/*
+ * Loops for scripts/bench that would drown in the cost of a call from Python: the lock-in block by block, the lock-in
+ * that everybody writes first, and how fast this machine reads memory.
+ */
+#include <math.h>
+#include <stddef.h>
+
+#include <tactus/tactus.h>
+
+void bench_lockin(const float *samples_V, size_t blocks, size_t n, double rate_Hz, double frequency_Hz,
+				  double *amplitude_V, double *phase_rad);
+void bench_lockin_sine(const float *samples_V, size_t blocks, size_t n, double rate_Hz, double frequency_Hz,
+					   double *amplitude_V, double *phase_rad);
+float bench_read(const float *values, size_t n);
+
+void bench_lockin(const float *samples_V, size_t blocks, size_t n, double rate_Hz, double frequency_Hz,
+				  double *amplitude_V, double *phase_rad)
+{
+	double offset_V;
+	for (size_t b = 0; b < blocks; b++)
+		(void)tactus_lockin_block_f32(samples_V + b * n, n, rate_Hz, frequency_Hz, &amplitude_V[b], &phase_rad[b],
+									  &offset_V);
+}
+
+/* A sine and a cosine per sample, for whole numbers of periods. */
+void bench_lockin_sine(const float *samples_V, size_t blocks, size_t n, double rate_Hz, double frequency_Hz,
+					   double *amplitude_V, double *phase_rad)
+{
+	for (size_t b = 0; b < blocks; b++) {
+		double in_phase = 0, quadrature = 0;
+		for (size_t i = 0; i < n; i++) {
+			double angle = 2 * M_PI * frequency_Hz * (double)i / rate_Hz;
+			in_phase += (double)samples_V[b * n + i] * cos(angle);
+			quadrature += (double)samples_V[b * n + i] * sin(angle);
+		}
+		amplitude_V[b] = 2 * hypot(in_phase, quadrature) / (double)n;
+		phase_rad[b] = atan2(-quadrature, in_phase);
+	}
+}
+
+/* A sum over 32-byte vectors, eight at a time: bound by memory, as in STREAM; n is a multiple of 64. */
+float bench_read(const float *values, size_t n)
+{
+	typedef float vector __attribute__((vector_size(32)));
+	const vector *in = (const vector *)(const void *)values;
+	vector sum[8] = {{0}};
+	for (size_t i = 0; i < n / 8; i += 8)
+		for (size_t k = 0; k < 8; k++)
+			sum[k] += in[i + k];
+	float total = 0;
+	for (size_t k = 0; k < 8; k++)
+		for (size_t lane = 0; lane < 8; lane++)
+			total += sum[k][lane];
+	return total;
+}
