@@ -252,7 +252,7 @@ tsan: ## the tests that use threads under ThreadSanitizer
 sanitized: all tests
 	@scripts/run-tests $(BUILD) unit cli
 
-THREADED := $(filter %_threads %_fit,$(UNIT))
+THREADED := $(filter $(BUILD)/tests/test_threads $(BUILD)/tests/test_fit%,$(UNIT))
 .PHONY: threaded
 threaded: $(THREADED)
 	@scripts/run-tests $(BUILD) $(THREADED)
