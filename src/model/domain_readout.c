@@ -8,7 +8,7 @@ static const double pi = 3.14159265358979323846;
 
 static const tactus_signal signals[READOUT_SIGNALS] = {
 	[READOUT_TIME] = {"time_s", "s", TACTUS_ROLE_TIME, NAN},
-	[READOUT_RESISTANCE] = {"reference_resistance_ohm", "ohm", TACTUS_ROLE_INPUT, NAN},
+	[READOUT_RESISTANCE] = {"reference_resistance_ohm", "ohm", TACTUS_ROLE_INPUT, INFINITY},
 	[READOUT_CAPACITANCE] = {"reference_capacitance_F", "F", TACTUS_ROLE_INPUT, 0},
 	[READOUT_FREQUENCY] = {"frequency_Hz", "Hz", TACTUS_ROLE_INPUT, NAN},
 	[READOUT_DRIVE] = {"drive_V", "V", TACTUS_ROLE_INPUT, NAN},

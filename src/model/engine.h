@@ -36,8 +36,8 @@ typedef struct {
 	const char *name;
 	/*
 	 * "output0", "output1" where it has the unit of that output, "N" where it has the input's: start and scale are then
-	 * those for a range of 1, to be multiplied by the range (divided where the unit is "1/…"). Likewise the start of a
-	 * TACTUS_CONSTANT: the value to state for that range. Every other unit: as they are.
+	 * those for a range of 1, to be multiplied by the range ("1/N", "1/N/s": divided by it, "1/N2", "1/N2/s": by its
+	 * square). Likewise the start of a TACTUS_CONSTANT: the value to state for that range. Every other unit: as it is.
 	 */
 	const char *unit;
 	const char *summary;
@@ -53,7 +53,8 @@ typedef struct {
 
 enum tactus_role {
 	TACTUS_ROLE_TIME,      /* seconds; NaN throughout when the recording has no clock */
-	TACTUS_ROLE_INPUT,     /* the domain's inputs; effects may change them in place (the chain works on a copy) */
+	TACTUS_ROLE_INPUT,     /* the domain's inputs; effects may change them in place (the chain works on a copy); a
+							  recording must have it where `fill` is NaN, and one of the others if there are any */
 	TACTUS_ROLE_COVARIATE, /* recorded beside; `fill` where the recording has none */
 	TACTUS_ROLE_NEIGHBOUR, /* an input of the channel before (-1) or after (+1) at this instant; 0 where there is none
 							*/
@@ -154,7 +155,7 @@ enum tactus_sensor_base { SENSOR_BASE_G0, SENSOR_BASE_G1, SENSOR_BASE_C0, SENSOR
 
 enum tactus_readout_signal {
 	READOUT_TIME,        /* time_s */
-	READOUT_RESISTANCE,  /* reference_resistance_ohm: input; empty or 0 means open: no conductance */
+	READOUT_RESISTANCE,  /* reference_resistance_ohm: input; empty, 0 or infinite means open: no conductance */
 	READOUT_CAPACITANCE, /* reference_capacitance_F: input; empty means 0 */
 	READOUT_FREQUENCY,   /* frequency_Hz; 0 is DC */
 	READOUT_DRIVE,       /* drive_V, peak in AC */

@@ -1,0 +1,64 @@
+/* How much of a signal a series holds: what the `testable` hooks of effects ask. */
+#include <math.h>
+
+#include "model/series.h"
+
+double tactus_series_minimum(const tactus_series *series, int signal)
+{
+	double minimum = NAN;
+	for (size_t i = 0; series->signal[signal] != NULL && i < series->n; i++)
+		minimum = fmin(minimum, series->signal[signal][i]);
+	return minimum;
+}
+
+double tactus_series_maximum(const tactus_series *series, int signal)
+{
+	double maximum = NAN;
+	for (size_t i = 0; series->signal[signal] != NULL && i < series->n; i++)
+		maximum = fmax(maximum, series->signal[signal][i]);
+	return maximum;
+}
+
+size_t tactus_series_distinct(const tactus_series *series, int signal, size_t stop_at)
+{
+	double found[64];
+	size_t count = 0;
+	for (size_t i = 0; series->signal[signal] != NULL && i < series->n && count < stop_at && count < 64; i++) {
+		double value = series->signal[signal][i];
+		size_t k = 0;
+		while (k < count && found[k] != value)
+			k++;
+		if (k == count && !isnan(value))
+			found[count++] = value;
+	}
+	return count;
+}
+
+double tactus_series_duration_s(const tactus_series *series)
+{
+	for (size_t s = 0; series->has_clock && s < series->domain->signal_count; s++)
+		if (series->domain->signals[s].role == TACTUS_ROLE_TIME)
+			return tactus_series_maximum(series, (int)s) - tactus_series_minimum(series, (int)s);
+	return 0;
+}
+
+size_t tactus_series_reversals(const tactus_series *series, int signal)
+{
+	const double *values = series->signal[signal];
+	double threshold = 0.05 * (tactus_series_maximum(series, signal) - tactus_series_minimum(series, signal));
+	double low = NAN, high = NAN; /* extremes since the last reversal */
+	int direction = 0;
+	size_t count = 0;
+	for (size_t i = 0; values != NULL && i < series->n; i++) {
+		low = fmin(low, values[i]);
+		high = fmax(high, values[i]);
+		bool fell = direction >= 0 && values[i] < high - threshold;
+		bool rose = direction <= 0 && values[i] > low + threshold;
+		if (!fell && !rose)
+			continue;
+		count += direction != 0;
+		direction = rose ? 1 : -1;
+		low = high = values[i];
+	}
+	return count;
+}
