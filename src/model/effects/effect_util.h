@@ -1,0 +1,112 @@
+/*
+ * What effects share: the step of the clock, the first-order filter, what a series must hold to test them.
+ *
+ * Every first-order filter of the catalogue is discretised alike and exactly for any step dt: the input of a sample is
+ * taken as held over the interval that ends with it, x += (1 − exp(−dt/τ)) (u − x). So the output answers to its own
+ * sample (it inverts sample by sample, without ringing) and τ = 0 is no filter at all.
+ */
+#ifndef TACTUS_EFFECT_UTIL_H
+#define TACTUS_EFFECT_UTIL_H
+
+#include <math.h>
+
+#include "model/effects/effects.h"
+#include "model/series.h"
+
+#define TACTUS_PI 3.14159265358979323846
+
+/* Parameters of one effect, and their count, for the const struct. */
+#define TACTUS_PARAMETERS(table) .parameters = (table), .parameter_count = sizeof(table) / sizeof((table)[0])
+
+/* An effect's memory of the clock: NaN before the first sample. */
+static inline bool tactus_first(double last_s)
+{
+	return isnan(last_s);
+}
+
+/* Seconds since the last sample, never negative; 0 for the first. A clock that steps back starts a new stretch. */
+static inline double tactus_elapsed(double *last_s, double time_s)
+{
+	double dt = tactus_first(*last_s) ? 0 : fmax(time_s - *last_s, 0);
+	*last_s = time_s;
+	return dt;
+}
+
+/* One step of the first-order filter. */
+static inline double tactus_lowpass(double x, double input, double dt, double time_constant_s)
+{
+	return time_constant_s > 0 ? input + exp(-dt / time_constant_s) * (x - input) : input;
+}
+
+/* (t/T)^n, odd in t. */
+static inline double tactus_odd_power(double ratio, double exponent)
+{
+	return copysign(pow(fabs(ratio), exponent), ratio);
+}
+
+static inline double tactus_clamp(double x, double lower, double upper)
+{
+	return fmin(fmax(x, lower), upper);
+}
+
+/* ---- testable ------------------------------------------------------------------------------------------------ */
+
+static inline const char *tactus_want_clock(const tactus_series *series)
+{
+	return series->has_clock ? NULL : "no time_s: seconds are unknown";
+}
+
+static inline const char *tactus_want_order(const tactus_series *series)
+{
+	return series->has_order ? NULL : "neither time_s nor sequence: the order of the rows is unknown";
+}
+
+static inline const char *tactus_want_force_range(const tactus_series *series)
+{
+	return tactus_series_distinct(series, SENSOR_FORCE, 3) < 3 ? "force_N has fewer than three values" : NULL;
+}
+
+/* The load goes up and comes down again. */
+static inline const char *tactus_want_reversal(const tactus_series *series)
+{
+	return tactus_series_reversals(series, SENSOR_FORCE) < 1 ? "force_N never turns: it only rises or only falls"
+															 : NULL;
+}
+
+/* The load goes up and down more than once. */
+static inline const char *tactus_want_cycles(const tactus_series *series)
+{
+	return tactus_series_reversals(series, SENSOR_FORCE) < 3 ? "force_N does not cycle" : NULL;
+}
+
+static inline const char *tactus_want_ac(const tactus_series *series)
+{
+	return tactus_series_maximum(series, READOUT_FREQUENCY) > 0 ? NULL : "no ac rows: frequency_Hz is never above 0";
+}
+
+static inline const char *tactus_want_frequencies(const tactus_series *series)
+{
+	size_t wanted = tactus_series_minimum(series, READOUT_FREQUENCY) > 0 ? 2 : 3; /* DC is one of them */
+	return tactus_series_distinct(series, READOUT_FREQUENCY, wanted) < wanted
+			   ? "frequency_Hz has fewer than two values above 0"
+			   : NULL;
+}
+
+/* Smallest and largest |signal| among the rows where an output has a value. False if there is none. */
+static inline bool tactus_magnitudes(const tactus_series *series, int signal, int output, double *least, double *most)
+{
+	*least = INFINITY;
+	*most = -INFINITY;
+	if (!series->signal[signal] || !series->signal[output])
+		return false;
+	for (size_t i = 0; i < series->n; i++) {
+		double value = fabs(series->signal[signal][i]);
+		if (isnan(value) || isnan(series->signal[output][i]))
+			continue;
+		*least = fmin(*least, value);
+		*most = fmax(*most, value);
+	}
+	return *most >= *least;
+}
+
+#endif
