@@ -49,6 +49,14 @@ static inline double tactus_clamp(double x, double lower, double upper)
 	return fmin(fmax(x, lower), upper);
 }
 
+/* A complex number divided by 1 + z, in place. */
+static inline void tactus_divide(double *re, double *im, double z_re, double z_im)
+{
+	double d_re = 1 + z_re, square = d_re * d_re + z_im * z_im, quotient = (*re * d_re + *im * z_im) / square;
+	*im = (*im * d_re - *re * z_im) / square;
+	*re = quotient;
+}
+
 /* ---- testable ------------------------------------------------------------------------------------------------ */
 
 static inline const char *tactus_want_clock(const tactus_series *series)
