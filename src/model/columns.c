@@ -184,9 +184,11 @@ const tactus_domain *tactus_series_domain(const tactus_table *recording, const t
 	return found;
 }
 
+/* Before the first row the type of a foreign column is not known: its name is enough. */
 static bool has_column(const tactus_columns *columns, size_t s)
 {
-	return columns->signal[s] != NULL;
+	return columns->signal[s] != NULL ||
+		   (columns->rows == 0 && columns->name[s] != NULL && tactus_table_find(columns->table, columns->name[s]) >= 0);
 }
 
 int tactus_columns_bind(const tactus_table *table, const tactus_series_options *options, tactus_columns *columns)
@@ -221,4 +223,17 @@ bool tactus_columns_in_mode(const tactus_columns *columns, size_t row, const cha
 {
 	return mode == NULL || *mode == '\0' || columns->mode == NULL || columns->mode[row].length == 0 ||
 		   tactus_columns_has_mode(columns, row, mode);
+}
+
+int tactus_columns_support(const tactus_columns *columns, const tactus_effect *effect)
+{
+	for (size_t s = 0; s < columns->domain->signal_count; s++) {
+		const tactus_signal *kind = &columns->domain->signals[s];
+		bool clock = kind->role == TACTUS_ROLE_TIME && (effect->flags & TACTUS_EFFECT_CLOCK) != 0;
+		bool covariate = kind->role == TACTUS_ROLE_COVARIATE && strcmp(kind->name, effect->covariate) == 0;
+		if ((clock || covariate) && columns->signal[s] == NULL)
+			return tactus_fail(TACTUS_ERR_INPUT, "%sno column '%s', which the model's effect '%s' needs",
+							   tactus_columns_where(columns), kind->name, effect->name);
+	}
+	return TACTUS_OK;
 }
