@@ -53,8 +53,8 @@ struct loading {
 /* Scans from `first` on, as many as a block holds: every channel at the same instant under the same load. */
 static int fill(const struct loading *loading, uint64_t first, tactus_table *block)
 {
-	uint64_t scans = loading->scans - first, most = BLOCK_ROWS / loading->channel_count;
-	scans = scans < most || !most ? scans : most;
+	uint64_t scans = loading->scans - first, most = BLOCK_ROWS / loading->channel_count + 1;
+	scans = scans < most ? scans : most;
 	int error = tactus_table_resize(block, (size_t)scans * loading->channel_count);
 	if (error)
 		return error;

@@ -15,6 +15,7 @@
 #include <tactus/device.h>
 #include <tactus/error.h>
 #include <tactus/fit.h>
+#include <tactus/join.h>
 #include <tactus/model.h>
 #include <tactus/readout.h>
 #include <tactus/table.h>
