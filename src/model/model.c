@@ -33,6 +33,11 @@ const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tact
 	return NULL;
 }
 
+const char *tactus_model_input(const tactus_model *model)
+{
+	return model->input_name ? model->input_name : tactus_domain_signal(model->domain, TACTUS_ROLE_INPUT, 0)->name;
+}
+
 const char *tactus_form_name(enum tactus_form form)
 {
 	return forms[form].name;
@@ -367,7 +372,7 @@ void tactus_model_fingerprint(const tactus_model *model, char text[17])
 	uint64_t hash = 0xcbf29ce484222325u;
 	hash_text(&hash, model->domain->name);
 	hash_text(&hash, forms[model->form].name);
-	hash_text(&hash, model->input_name);
+	hash_text(&hash, tactus_model_input(model));
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
 		hash_text(&hash, model->output_name[o]);
 		hash_text(&hash, model->output_mode[o]);

@@ -115,8 +115,7 @@ static void put_model(FILE *file, const tactus_model *model)
 			"# A tactus model; `tactus show FILE` explains it.\nkind = \"model\"\nformat = 1\ndomain = \"%s\"\n"
 			"form = \"%s\"\ninput = ",
 			model->domain->name, tactus_form_name(model->form));
-	put_string(file,
-			   model->input_name ? model->input_name : tactus_domain_signal(model->domain, TACTUS_ROLE_INPUT, 0)->name);
+	put_string(file, tactus_model_input(model));
 	if (model->form == TACTUS_FORM_FORWARD) {
 		fputs("\neffects = [", file);
 		for (size_t k = 0; k < model->effect_count; k++)
