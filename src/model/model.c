@@ -33,11 +33,6 @@ const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tact
 	return NULL;
 }
 
-const char *tactus_model_input(const tactus_model *model)
-{
-	return model->input_name ? model->input_name : tactus_domain_signal(model->domain, TACTUS_ROLE_INPUT, 0)->name;
-}
-
 const char *tactus_form_name(enum tactus_form form)
 {
 	return forms[form].name;

@@ -58,8 +58,6 @@ tactus_model_channel_data *tactus_model_find_channel(const tactus_model *model, 
 int tactus_model_chain(const tactus_model *model, const tactus_model_channel_data *channel, tactus_chain **chain);
 /* The i-th signal of a role in a domain's table, NULL past the last: output 1, say. */
 const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tactus_role role, size_t i);
-/* The column that plays the input: input_name, or the domain's own. */
-const char *tactus_model_input(const tactus_model *model);
 /* Names of an estimator's parameters, NULL-terminated. */
 const char *const *tactus_estimator_parameters(enum tactus_form form);
 const char *const *tactus_estimator_units(enum tactus_form form);
