@@ -100,6 +100,19 @@ static inline const char *tactus_want_frequencies(const tactus_series *series)
 			   : NULL;
 }
 
+/* Two rows with different loads; no resistance is an open one. */
+static inline const char *tactus_want_loads(const tactus_series *series)
+{
+	const double *r = series->signal[READOUT_RESISTANCE], *c = series->signal[READOUT_CAPACITANCE];
+	for (size_t i = 1; i < series->n; i++) {
+		double here = r && r[i] > 0 ? 1 / r[i] : 0, first = r && r[0] > 0 ? 1 / r[0] : 0;
+		double c_here = c && c[i] > 0 ? c[i] : 0, c_first = c && c[0] > 0 ? c[0] : 0;
+		if (here != first || c_here != c_first)
+			return NULL;
+	}
+	return "all rows have the same load";
+}
+
 /* Smallest and largest |signal| among the rows where an output has a value. False if there is none. */
 static inline bool tactus_magnitudes(const tactus_series *series, int signal, int output, double *least, double *most)
 {

@@ -16,12 +16,7 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 static const char *testable(const tactus_series *series)
 {
 	const char *why = tactus_want_ac(series);
-	if (why)
-		return why;
-	return tactus_series_distinct(series, READOUT_RESISTANCE, 2) < 2 &&
-				   tactus_series_distinct(series, READOUT_CAPACITANCE, 2) < 2
-			   ? "one load only: several resistances and capacitances, or an open channel, are needed"
-			   : NULL;
+	return why ? why : tactus_want_loads(series);
 }
 
 const struct tactus_effect tactus_effect_readout_stray_capacitance = {

@@ -40,12 +40,15 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 
 static const char *testable(const tactus_series *series)
 {
+	double least, most;
 	const char *why = tactus_want_clock(series);
 	if (why)
 		return why;
 	if (!series->recorded[SENSOR_DRIVE])
 		return "no drive_V";
-	return tactus_series_distinct(series, SENSOR_DRIVE, 2) < 2 ? "drive_V never changes" : NULL;
+	return tactus_magnitudes(series, SENSOR_DRIVE, SENSOR_FORCE, &least, &most) && least < most
+			   ? NULL
+			   : "drive_V never changes";
 }
 
 const struct tactus_effect tactus_effect_sensor_self_heating = {
