@@ -31,6 +31,8 @@ typedef struct {
 TACTUS_API const tactus_domain *tactus_domain_find(const char *name);
 /** The i-th domain, NULL past the last. */
 TACTUS_API const tactus_domain *tactus_domain_at(size_t i);
+/** The domain that a recording's columns say (their names), NULL with a message if none or two. */
+TACTUS_API const tactus_domain *tactus_domain_of(const tactus_table *recording);
 TACTUS_API const char *tactus_domain_name(const tactus_domain *domain);
 TACTUS_API size_t tactus_domain_effects(const tactus_domain *domain);
 TACTUS_API const tactus_effect *tactus_domain_effect(const tactus_domain *domain, size_t i);

@@ -2,6 +2,12 @@
 #include <assert.h>
 
 #include "model/model.h"
+#include "model/series.h"
+
+const tactus_domain *tactus_domain_of(const tactus_table *recording)
+{
+	return tactus_series_domain(recording, &(tactus_series_options){0});
+}
 
 const char *tactus_model_input(const tactus_model *model)
 {

@@ -1,0 +1,65 @@
+/* tactus show: says what a model, bench or recording is; --effects prints the catalogue. */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "show.h"
+
+/* What the first line that is no comment looks like: `key = …` or `[table]` is TOML, anything else a recording. */
+static bool looks_like_toml(const char *file)
+{
+	char line[256];
+	bool toml = false, begins = true;
+	FILE *stream = strcmp(file, "-") ? fopen(file, "r") : NULL;
+	while (stream && fgets(line, sizeof line, stream)) {
+		bool whole = strchr(line, '\n') != NULL, blank = line[strspn(line, " \t\r\n")] == '\0';
+		if (begins && line[0] != '#' && !blank) {
+			size_t key = strspn(line, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-");
+			toml = line[0] == '[' || (key && line[key + strspn(line + key, " \t")] == '=');
+			break;
+		}
+		begins = whole;
+	}
+	if (stream)
+		fclose(stream);
+	return toml;
+}
+
+static int run(struct cli *cli)
+{
+	const char *name = cli_argument(cli, 0);
+	if (cli_has(cli, "effects"))
+		return cli_show_effects(cli, name);
+	const char *file = cli_recording(cli, 0);
+	if (!file)
+		return CLI_USAGE;
+	return looks_like_toml(file) ? cli_show_model(cli, file) : cli_show_recording(cli, file);
+}
+
+static const struct cli_option options[] = {
+	{"effects", 0, CLI_FLAG, NULL, NULL, "list the effects that models can have, or explain the one named"},
+	{"json", 0, CLI_FLAG, NULL, NULL, "print one JSON object"},
+	CLI_OPTIONS_READ,
+	{NULL, 0, CLI_FLAG, NULL, NULL, NULL},
+};
+
+const struct cli_command cli_show = {
+	.name = "show",
+	.summary = "say what a recording, a model or a bench is; list the known effects",
+	.arguments = "[FILE | EFFECT]",
+	.description =
+		"Of a recording: its domain, rows, channels, every column with its range and how many values are missing, the "
+		"clock (rate, gaps, repeats), lost scans, and the metadata.\n\n"
+		"Of a model: its form, what it computes from what, the parameters of every channel with their standard "
+		"errors, the range that it is valid in, its errors, and where it came from. Of a bench: what the bench is "
+		"made of.\n\n"
+		"With --effects, the catalogue of physical causes that a model may have beside the base equations: what each "
+		"does, where it is published, its parameters, what a recording must contain for it to be found, and what it is "
+		"confused with.",
+	.examples = "tactus show run.csv\n"
+				"tactus show model.toml --json\n"
+				"tactus show --effects creep\n",
+	.options = options,
+	.arguments_max = 1,
+	.run = run,
+};

@@ -1,0 +1,15 @@
+/* The three things that `tactus show` explains; each prints text, or JSON with --json, and returns an exit status. */
+#ifndef TACTUS_CLI_SHOW_H
+#define TACTUS_CLI_SHOW_H
+
+#include "cli.h"
+
+int cli_show_recording(const struct cli *cli, const char *file);
+int cli_show_model(const struct cli *cli, const char *file);
+/* The catalogue, or one effect of it. */
+int cli_show_effects(const struct cli *cli, const char *name);
+
+/* "12.34 ± 0.05 N", with as many digits as the standard error (NaN: none) bears; written to text and returned. */
+const char *cli_value_text(double value, double standard_error, const char *unit, char text[96]);
+
+#endif
