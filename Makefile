@@ -45,7 +45,8 @@ DEPFLAGS = -MMD -MP
 
 LIB_C := $(wildcard src/*.c src/*/*.c src/*/*/*.c src/*/*/*/*.c)
 LIB_CXX := $(wildcard src/*/*.cpp)
-LIB_OBJ := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cpp=$(BUILD)/%.o)
+BENCHES := $(wildcard src/device/benches/*.toml)
+LIB_OBJ := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cpp=$(BUILD)/%.o) $(BUILD)/src/device/benches.o
 CLI_C := $(wildcard cli/*.c)
 CLI_OBJ := $(CLI_C:%.c=$(BUILD)/%.o)
 UNIT_C := $(wildcard tests/unit/test_*.c)
@@ -77,7 +78,7 @@ all: $(PROGRAM) $(SHARED) $(STATIC) $(BUILD)/tactus.pc ## build the program and 
 FLAGS := $(CC) $(CXX) $(CPPFLAGS_ALL) $(CFLAGS_ALL) $(CXXFLAGS_ALL) $(LIB_CFLAGS) $(LDFLAGS) $(LDLIBS_PRIVATE)
 # The list of objects likewise: a source that was removed leaves the libraries.
 $(BUILD)/flags: CONTENT = $(FLAGS)
-$(BUILD)/objects: CONTENT = $(LIB_OBJ) $(CLI_OBJ)
+$(BUILD)/objects: CONTENT = $(LIB_OBJ) $(CLI_OBJ) $(BENCHES)
 $(BUILD)/flags $(BUILD)/objects: FORCE
 	@mkdir -p $(@D)
 	@echo '$(CONTENT)' | cmp -s - $@ || echo '$(CONTENT)' >$@
@@ -99,6 +100,14 @@ $(BUILD)/src/%.o: src/%.c
 $(BUILD)/src/%.o: src/%.cpp
 	@mkdir -p $(@D)
 	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(LIB_CXXFLAGS) $(CXXFLAGS_ALL) $(DEPFLAGS) -c $< -o $@
+
+# The built-in benches are in the library, as text.
+$(BUILD)/src/device/benches.c: src/device/benches/embed.sh $(BENCHES) $(BUILD)/objects
+	@mkdir -p $(@D)
+	@sh src/device/benches/embed.sh $(BENCHES) >$@
+
+$(BUILD)/src/device/benches.o: $(BUILD)/src/device/benches.c
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(LIB_CFLAGS) $(CFLAGS_ALL) $(DEPFLAGS) -c $< -o $@
 
 # The program sees the public headers only, as any other user of the library would.
 $(BUILD)/cli/%.o: cli/%.c

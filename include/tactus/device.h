@@ -65,6 +65,7 @@ typedef struct {
 	enum tactus_mode mode;
 	double drive_V, frequency_Hz;
 	double detector_amplitude_V, detector_phase_V, detector_dc_V;
+	double amplitude_V, phase_rad; /**< where the device gives these instead of detector volts (a played recording) */
 	double force_N, temperature_degC;
 	double reference_resistance_ohm, reference_capacitance_F; /**< known loads */
 	unsigned quality;

@@ -1,0 +1,90 @@
+/* A bench file in memory: what the simulated bench is made of. Every number is SI; names are those of the file. */
+#ifndef TACTUS_BENCH_H
+#define TACTUS_BENCH_H
+
+#include "model/engine.h"
+
+enum { TACTUS_BENCH_SENSORS_MAX = 64, TACTUS_BENCH_EFFECTS_MAX = 16 };
+
+/* An effect of the catalogue as a bench file sets it. */
+typedef struct {
+	const tactus_effect *effect;
+	double parameters[TACTUS_PARAMETERS_MAX];
+	int file; /* which file of a chain of bases set it: a later one replaces */
+} tactus_bench_effect;
+
+typedef struct {
+	tactus_bench_effect item[TACTUS_BENCH_EFFECTS_MAX];
+	size_t count;
+} tactus_bench_effects;
+
+/* Steps of conductance and capacitance at random loads of a run (Paredes-Madrid 2010, figs. 2 and 9). */
+typedef struct {
+	double count;                                     /* steps in a run; 0: none */
+	double conductance_S, capacitance_F, correlation; /* standard deviations of a step */
+} tactus_bench_jumps;
+
+typedef struct {
+	int channel;
+	double base[TACTUS_PARAMETERS_MAX];
+	double load_share; /* of the press's load that this sensor carries */
+	/* Where the film touches changes as the load moves: a correlated deviation that holds while the load holds. */
+	double repeatability_S, repeatability_F, repeatability_correlation, repeatability_length_N;
+	tactus_bench_jumps contact_jump;
+	tactus_bench_effects effects; /* on the film */
+	tactus_bench_effects readout; /* on the electronics while this channel is selected */
+} tactus_bench_sensor;
+
+typedef struct {
+	char *name, *description, *start, *protocol;
+	double seed, lost_scans;
+	struct {
+		double rate_Hz, settle_s, drive_V, dc_drive_V, frequency_Hz;
+		unsigned modes;
+	} scan;
+	struct {
+		double minimum_N, maximum_N;
+		/* An eccentric wheel and a spring, where both are given: the load is that of the motor's angle. */
+		double eccentricity_m, spring_N_per_m, response_s;
+	} press;
+	struct {
+		double resistance_ohm, lead_capacitance_F, charge_C, node_capacitance_F;
+	} switches;
+	struct {
+		double gain_resistor_ohm, maximum_V;
+	} amplifier;
+	struct {
+		double amplitude_gain, amplitude_offset_V, amplitude_filter_s;
+		double phase_supply_V, phase_filter_s;
+		double dc_gain, dc_filter_s;
+		bool phase_inverted;
+	} detectors;
+	struct {
+		double bits, minimum_V, maximum_V, noise_V, sample_s;
+	} adc;
+	struct {
+		double noise_N, resolution_N, latency_s;
+		bool present;
+	} reference;
+	struct {
+		double base_degC, ramp_degC_per_s, amplitude_degC, period_s, noise_degC, resolution_degC;
+		bool present;
+	} temperature;
+	tactus_bench_sensor sensors[TACTUS_BENCH_SENSORS_MAX]; /* in the order of their channels */
+	size_t sensor_count;
+} tactus_bench;
+
+/* A built-in file: its text was put into the library at build time. */
+typedef struct {
+	const char *name, *text;
+} tactus_builtin;
+extern const tactus_builtin tactus_builtins[]; /* ends with a NULL name; benches and "loads-…" */
+const char *tactus_builtin_find(const char *name);
+
+/* A built-in bench by name, or a file. TACTUS_ERR_DEVICE if it is neither, TACTUS_ERR_INPUT with FILE:LINE:COLUMN. */
+int tactus_bench_open(const char *name, tactus_bench **bench);
+void tactus_bench_free(tactus_bench *bench);
+/* The sensor on a channel, or NULL. */
+const tactus_bench_sensor *tactus_bench_find(const tactus_bench *bench, int channel);
+
+#endif

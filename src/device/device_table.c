@@ -1,0 +1,161 @@
+/* Readings of a scan as a table in the contract's columns. */
+#include <math.h>
+
+#include "core/core.h"
+#include "device/device.h"
+
+/* Everything the columns are made of. */
+typedef struct {
+	const tactus_device *device;
+	const tactus_reading *readings;
+	size_t n;
+	tactus_table *table;
+	tactus_detectors detectors;
+	int code;
+} job;
+
+typedef double getter(const job *j, const tactus_reading *reading);
+
+static double time_s(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->time_s;
+}
+
+static double sequence(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return (double)r->sequence;
+}
+
+static double channel(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->channel;
+}
+
+static double drive_V(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->drive_V;
+}
+
+static double frequency_Hz(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->frequency_Hz;
+}
+
+/* Volts at the amplifier's output: signed in DC, peak in AC. */
+static double amplitude_V(const job *j, const tactus_reading *r)
+{
+	if (!isnan(r->amplitude_V) || !j->device->has_detectors)
+		return r->amplitude_V;
+	return r->mode == TACTUS_MODE_DC ? tactus_detectors_dc(&j->detectors, r->detector_dc_V)
+									 : tactus_detectors_amplitude(&j->detectors, r->detector_amplitude_V);
+}
+
+static double phase_rad(const job *j, const tactus_reading *r)
+{
+	if (!isnan(r->phase_rad) || !j->device->has_detectors || r->mode == TACTUS_MODE_DC)
+		return r->phase_rad;
+	return tactus_detectors_phase(&j->detectors, r->detector_phase_V);
+}
+
+static double detector_amplitude_V(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->detector_amplitude_V;
+}
+
+static double detector_phase_V(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->detector_phase_V;
+}
+
+static double detector_dc_V(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->detector_dc_V;
+}
+
+static double force_N(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->force_N;
+}
+
+static double temperature_degC(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->temperature_degC;
+}
+
+static double reference_resistance_ohm(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->reference_resistance_ohm;
+}
+
+static double reference_capacitance_F(const job *j, const tactus_reading *r)
+{
+	(void)j;
+	return r->reference_capacitance_F;
+}
+
+static void put(job *j, bool wanted, const char *name, getter *get)
+{
+	if (!wanted || j->code < 0)
+		return;
+	double *column = tactus_table_set_numbers(j->table, name);
+	if (column == NULL && j->n > 0)
+		j->code = tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	for (size_t i = 0; i < j->n && column != NULL; i++)
+		column[i] = get(j, &j->readings[i]);
+}
+
+static void put_mode(job *j)
+{
+	tactus_text *column = j->code < 0 ? NULL : tactus_table_set_texts(j->table, "mode");
+	for (size_t i = 0; i < j->n && column != NULL; i++)
+		column[i] = (tactus_text){j->readings[i].mode == TACTUS_MODE_DC ? "dc" : "ac", 2};
+}
+
+/* A device alone knows of clipping, which is therefore the only flag but "ok" that it sets. */
+static void put_quality(job *j)
+{
+	tactus_text *column = j->code < 0 ? NULL : tactus_table_set_texts(j->table, "quality");
+	for (size_t i = 0; i < j->n && column != NULL; i++)
+		column[i] = (j->readings[i].quality & TACTUS_QUALITY_CLIPPED) != 0 ? (tactus_text){"clipped", 7}
+																		   : (tactus_text){"ok", 2};
+}
+
+int tactus_device_table(const tactus_device *device, const tactus_reading *readings, size_t n, bool raw,
+						tactus_table *table)
+{
+	job j = {.device = device, .readings = readings, .n = n, .table = table};
+	if (raw && !device->has_detectors)
+		return tactus_fail(TACTUS_ERR_UNSUPPORTED, "this device gives no detector volts");
+	if (device->has_detectors)
+		j.code = tactus_detectors_get(device->metadata, &j.detectors);
+	if (j.code >= 0)
+		j.code = tactus_table_resize(table, n);
+	put(&j, true, "time_s", time_s);
+	put(&j, true, "sequence", sequence);
+	put(&j, true, "channel", channel);
+	put_mode(&j);
+	put(&j, true, "drive_V", drive_V);
+	put(&j, true, "frequency_Hz", frequency_Hz);
+	put(&j, !raw, "amplitude_V", amplitude_V);
+	put(&j, !raw, "phase_rad", phase_rad);
+	put(&j, raw && (device->modes & TACTUS_MODE_AC) != 0, "detector_amplitude_V", detector_amplitude_V);
+	put(&j, raw && (device->modes & TACTUS_MODE_AC) != 0, "detector_phase_V", detector_phase_V);
+	put(&j, raw && (device->modes & TACTUS_MODE_DC) != 0, "detector_dc_V", detector_dc_V);
+	put_quality(&j);
+	put(&j, device->has_force, "force_N", force_N);
+	put(&j, device->has_temperature, "temperature_degC", temperature_degC);
+	put(&j, device->has_reference, "reference_resistance_ohm", reference_resistance_ohm);
+	put(&j, device->has_reference, "reference_capacitance_F", reference_capacitance_F);
+	return j.code;
+}

@@ -1,0 +1,506 @@
+/*
+ * The backend `sim:`: a bench from force to ADC counts. Scans are worked out in blocks: press, sensors (a chain per
+ * channel), then the electronics in the order of the readings. All randomness is counter-based: any blocking gives the
+ * same bytes.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <tactus/version.h>
+
+#include "core/core.h"
+#include "core/random.h"
+#include "device/sim.h"
+
+enum { BLOCK_SCANS = 64, BLOCK_FIELDS = 11 };
+static const double tick_s = 1e-6; /* of the bench's scan timer */
+
+typedef struct {
+	tactus_bench *bench;
+	uint64_t seed;
+	const tactus_bench_sensor *scanned[TACTUS_BENCH_SENSORS_MAX]; /* in the order of the scan */
+	size_t channel_count, mode_count;
+	unsigned modes;
+	double drive_V, dc_drive_V, frequency_Hz, settle_s, period_s;
+	uint64_t scan_count, next_scan;
+	tactus_protocol *protocol;
+	tactus_loads *loads;
+	sim_press press;
+	sim_sensor *sensors;
+	sim_electronics electronics;
+	size_t block_scans;
+	sim_block block;
+	size_t delivered; /* readings of the block */
+	double *scratch;
+	bool realtime;
+	tactus_pace pace;
+} tactus_sim;
+
+/* ---- settings ------------------------------------------------------------------------------------------------------
+ */
+
+static double given(double setting, double otherwise)
+{
+	return isnan(setting) || setting == 0 ? otherwise : setting;
+}
+
+static int choose_channels(tactus_sim *sim, const tactus_scan_settings *settings)
+{
+	if (settings->channel_count > TACTUS_BENCH_SENSORS_MAX)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "at most %d channels in a scan", TACTUS_BENCH_SENSORS_MAX);
+	sim->channel_count = settings->channel_count > 0 ? settings->channel_count : sim->bench->sensor_count;
+	for (size_t i = 0; i < sim->channel_count; i++) {
+		const int channel = settings->channel_count > 0 ? settings->channels[i] : sim->bench->sensors[i].channel;
+		sim->scanned[i] = tactus_bench_find(sim->bench, channel);
+		if (sim->scanned[i] == NULL)
+			return tactus_fail(TACTUS_ERR_ARGUMENT, "this bench has no channel %d; it has %d to %d", channel,
+							   sim->bench->sensors[0].channel,
+							   sim->bench->sensors[sim->bench->sensor_count - 1].channel);
+		for (size_t k = 0; k < i; k++)
+			if (sim->scanned[k] == sim->scanned[i])
+				return tactus_fail(TACTUS_ERR_ARGUMENT, "channel %d is there twice", channel);
+	}
+	return TACTUS_OK;
+}
+
+static int choose_modes(tactus_sim *sim, const tactus_scan_settings *settings)
+{
+	sim->modes = settings->modes != 0                                                  ? settings->modes
+				 : settings->loads != NULL && sim->bench->scan.modes != TACTUS_MODE_DC ? TACTUS_MODE_AC
+																					   : sim->bench->scan.modes;
+	sim->mode_count = (sim->modes & TACTUS_MODE_DC ? 1 : 0) + (sim->modes & TACTUS_MODE_AC ? 1 : 0);
+	/* The drive that is asked for is the AC source's, where both are on. */
+	const bool dc_only = sim->modes == TACTUS_MODE_DC;
+	sim->drive_V = given(dc_only ? NAN : settings->drive_V, sim->bench->scan.drive_V);
+	sim->dc_drive_V = given(dc_only ? settings->drive_V : NAN, sim->bench->scan.dc_drive_V);
+	sim->frequency_Hz = given(settings->frequency_Hz, sim->bench->scan.frequency_Hz);
+	if ((sim->modes & TACTUS_MODE_AC) != 0 && !(sim->drive_V > 0 && sim->frequency_Hz > 0))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "AC needs a drive and a frequency above zero; this bench states none");
+	if ((sim->modes & TACTUS_MODE_DC) != 0 && sim->dc_drive_V == 0)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "DC needs a drive; this bench states none");
+	return TACTUS_OK;
+}
+
+/* One value that is asked for takes the place of a list. */
+static void fix_list(double *list, size_t *count, double asked)
+{
+	if (isnan(asked) || asked == 0)
+		return;
+	list[0] = asked; /* lists have room for one more than they hold */
+	*count = 1;
+}
+
+static int choose_loads(tactus_sim *sim, const tactus_scan_settings *settings)
+{
+	if (settings->loads == NULL)
+		return TACTUS_OK;
+	if (settings->protocol != NULL)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "known loads take the sensors' places: there is nothing to press");
+	const int code = tactus_loads_open(settings->loads, &sim->loads);
+	if (code < 0)
+		return code;
+	if (sim->modes == TACTUS_MODE_DC) {
+		sim->loads->frequency_count = sim->loads->drive_count = 0;
+		return TACTUS_OK;
+	}
+	if (sim->loads->frequency_count > 0)
+		fix_list(sim->loads->frequencies_Hz, &sim->loads->frequency_count, settings->frequency_Hz);
+	if (sim->loads->drive_count > 0)
+		fix_list(sim->loads->drives_V, &sim->loads->drive_count, settings->drive_V);
+	return TACTUS_OK;
+}
+
+static double scan_time_s(const tactus_sim *sim, double frequency_Hz)
+{
+	double time_s = 0;
+	if ((sim->modes & TACTUS_MODE_DC) != 0)
+		time_s += sim->settle_s + sim_window_s(sim->bench, 0);
+	if ((sim->modes & TACTUS_MODE_AC) != 0)
+		time_s += sim->settle_s + sim_window_s(sim->bench, frequency_Hz);
+	return time_s * (double)sim->channel_count;
+}
+
+static int choose_rate(tactus_sim *sim, const tactus_scan_settings *settings)
+{
+	const double rate_Hz = given(settings->rate_Hz, sim->bench->scan.rate_Hz);
+	sim->settle_s = isnan(settings->settle_s) ? sim->bench->scan.settle_s : settings->settle_s;
+	if (!(rate_Hz > 0) || !(sim->settle_s >= 0))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "the rate must be above zero and the settle time not negative");
+	sim->period_s = fmax(1, round(1 / rate_Hz / tick_s)) * tick_s;
+	double longest_s = scan_time_s(sim, sim->frequency_Hz);
+	for (size_t i = 0; sim->loads != NULL && i < sim->loads->frequency_count; i++)
+		longest_s = fmax(longest_s, scan_time_s(sim, sim->loads->frequencies_Hz[i]));
+	if (longest_s > sim->period_s * (1 + 1e-9))
+		return tactus_fail(
+			TACTUS_ERR_ARGUMENT,
+			"%g scans a second are too many: %zu channels in %zu mode%s take %.3g ms; at most %.4g, or a "
+			"shorter settle time than %g ms",
+			rate_Hz, sim->channel_count, sim->mode_count, sim->mode_count > 1 ? "s" : "", 1e3 * longest_s,
+			1 / longest_s, 1e3 * sim->settle_s);
+	return TACTUS_OK;
+}
+
+/* Whole scans that fit in a time. */
+static uint64_t scans_in(const tactus_sim *sim, double duration_s)
+{
+	const double scans = floor(duration_s / sim->period_s * (1 + 1e-12) + 1e-6);
+	return scans < 1 ? 1 : (uint64_t)fmin(scans, 1e15);
+}
+
+/*
+ * What ends the scan: its count, its duration, the protocol that was asked for, once through all loads. The bench's
+ * own protocol ends it only where nothing else does; after its end the load stays.
+ */
+static int choose_end(tactus_sim *sim, const tactus_scan_settings *settings)
+{
+	const char *text = settings->protocol != NULL ? settings->protocol : sim->bench->protocol;
+	uint64_t end = UINT64_MAX;
+	const int code = tactus_protocol_parse(text, sim->seed, &sim->protocol);
+	if (code < 0)
+		return code;
+	if (!isnan(settings->duration_s) && !(settings->duration_s > 0))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "the duration must be above zero");
+	if (settings->count > 0)
+		end = settings->count;
+	if (!isnan(settings->duration_s) && scans_in(sim, settings->duration_s) < end)
+		end = scans_in(sim, settings->duration_s);
+	const uint64_t plan = sim->loads != NULL ? tactus_loads_scans(sim->loads, sim->channel_count)
+											 : scans_in(sim, tactus_protocol_duration_s(sim->protocol));
+	if (plan < end && (end == UINT64_MAX || settings->protocol != NULL || sim->loads != NULL))
+		end = plan;
+	sim->scan_count = end;
+	return TACTUS_OK;
+}
+
+/* ---- start and close ------------------------------------------------------------------------------------------------
+ */
+
+static void free_scan(tactus_sim *sim)
+{
+	for (size_t i = 0; i < sim->channel_count && sim->sensors != NULL; i++)
+		sim_sensor_free(&sim->sensors[i]);
+	free(sim->sensors);
+	sim_electronics_free(&sim->electronics);
+	tactus_protocol_free(sim->protocol);
+	tactus_loads_free(sim->loads);
+	free(sim->block.memory);
+	free(sim->block.readings);
+	free(sim->scratch);
+	tactus_bench *bench = sim->bench;
+	*sim = (tactus_sim){.bench = bench};
+}
+
+/* An effect that looks ahead needs the whole scan in one block. */
+static size_t scans_per_block(const tactus_sim *sim)
+{
+	for (size_t i = 0; i < sim->channel_count; i++)
+		for (size_t k = 0; k < sim->scanned[i]->effects.count; k++)
+			if ((sim->scanned[i]->effects.item[k].effect->flags & TACTUS_EFFECT_LOOKAHEAD) != 0)
+				return (size_t)sim->scan_count;
+	return sim->scan_count < BLOCK_SCANS ? (size_t)sim->scan_count : BLOCK_SCANS;
+}
+
+static int allocate_block(tactus_sim *sim)
+{
+	sim_block *block = &sim->block;
+	sim->block_scans = scans_per_block(sim);
+	const size_t n = sim->block_scans * sim->channel_count * sim->mode_count;
+	block->capacity = n;
+	block->memory = calloc(n, BLOCK_FIELDS * sizeof(double));
+	block->readings = calloc(n, sizeof(*block->readings));
+	sim->scratch = calloc(sim_sensor_scratch(n), sizeof(double));
+	if (block->memory == NULL || block->readings == NULL || sim->scratch == NULL)
+		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	double **const fields[BLOCK_FIELDS] = {&block->time_s,        &block->force_N,       &block->temperature_degC,
+										   &block->conductance_S, &block->capacitance_F, &block->resistance_ohm,
+										   &block->drive_V,       &block->frequency_Hz,  &block->channel,
+										   &block->amplitude_V,   &block->phase_rad};
+	for (size_t i = 0; i < BLOCK_FIELDS; i++)
+		*fields[i] = block->memory + i * n;
+	return TACTUS_OK;
+}
+
+static int start_parts(tactus_sim *sim)
+{
+	int code = sim->loads != NULL ? TACTUS_OK : sim_press_start(&sim->press, sim->bench, sim->protocol);
+	sim->sensors = calloc(sim->channel_count, sizeof(*sim->sensors));
+	if (code >= 0 && sim->sensors == NULL)
+		code = tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	for (size_t i = 0; i < sim->channel_count && code >= 0; i++)
+		code = sim_sensor_start(&sim->sensors[i], sim->bench, sim->scanned[i], sim->seed, sim->protocol);
+	if (code >= 0)
+		code = sim_electronics_start(&sim->electronics, sim->bench, sim->scanned, sim->channel_count, sim->settle_s,
+									 sim->seed);
+	return code < 0 ? code : allocate_block(sim);
+}
+
+static int set_channels(const tactus_sim *sim, tactus_metadata *metadata)
+{
+	char text[TACTUS_BENCH_SENSORS_MAX * 6] = "";
+	size_t length = 0;
+	for (size_t i = 0; i < sim->channel_count; i++)
+		length +=
+			(size_t)snprintf(text + length, sizeof(text) - length, "%s%d", i > 0 ? "," : "", sim->scanned[i]->channel);
+	return tactus_metadata_set(metadata, "channels", text);
+}
+
+/* A protocol of several lines is one line in a recording. */
+static int set_protocol(tactus_metadata *metadata, const char *protocol)
+{
+	char *line = tactus_strndup(protocol, strlen(protocol));
+	if (line == NULL)
+		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	for (char *c = line; *c != '\0'; c++)
+		if (*c == '\n' || *c == '\r' || *c == '\t')
+			*c = ' ';
+	const int code = tactus_metadata_set(metadata, "protocol", line);
+	free(line);
+	return code;
+}
+
+/* What a recording may know; effects of the bench file are not told. */
+static int set_metadata(const tactus_sim *sim, const tactus_scan_settings *settings, tactus_metadata *m)
+{
+	char now[32], identity[128];
+	const bool ac = (sim->modes & TACTUS_MODE_AC) != 0, dc = (sim->modes & TACTUS_MODE_DC) != 0;
+	tactus_now_text(now);
+	snprintf(identity, sizeof(identity), "sim:%s", sim->bench->name != NULL ? sim->bench->name : "");
+	int code = tactus_metadata_set(m, "tactus", tactus_version());
+	const char *start = sim->realtime || sim->bench->start == NULL ? now : sim->bench->start;
+	code = code < 0 ? code : tactus_metadata_set(m, "start", start);
+	code = code < 0 ? code : tactus_metadata_set(m, "device", identity);
+	code = code < 0
+			   ? code
+			   : tactus_metadata_set_number(m, "rate_requested_Hz", given(settings->rate_Hz, sim->bench->scan.rate_Hz));
+	code = code < 0 ? code : tactus_metadata_set_number(m, "rate_Hz", 1 / sim->period_s);
+	code = code < 0 ? code : set_channels(sim, m);
+	code = code < 0 ? code : tactus_metadata_set(m, "modes", ac && dc ? "dc,ac" : ac ? "ac" : "dc");
+	if (ac && (sim->loads == NULL || sim->loads->drive_count < 2))
+		code = code < 0 ? code : tactus_metadata_set_number(m, "drive_V", sim->drive_V);
+	if (dc)
+		code = code < 0 ? code : tactus_metadata_set_number(m, "dc_drive_V", sim->dc_drive_V);
+	if (ac && (sim->loads == NULL || sim->loads->frequency_count < 2))
+		code = code < 0 ? code : tactus_metadata_set_number(m, "frequency_Hz", sim->frequency_Hz);
+	code = code < 0 ? code : tactus_metadata_set_number(m, "settle_s", sim->settle_s);
+	if (sim->loads == NULL)
+		code =
+			code < 0 ? code : set_protocol(m, settings->protocol != NULL ? settings->protocol : sim->bench->protocol);
+	code = code < 0 ? code : tactus_metadata_set_number(m, "seed", (double)sim->seed);
+	return code < 0 ? code : sim_electronics_metadata(sim->bench, m);
+}
+
+static int sim_start(tactus_device *device, const tactus_scan_settings *settings)
+{
+	tactus_sim *sim = device->state;
+	free_scan(sim);
+	sim->seed = settings->seed != 0 ? settings->seed : (uint64_t)sim->bench->seed;
+	sim->realtime = settings->realtime;
+	int code = choose_channels(sim, settings);
+	code = code < 0 ? code : choose_modes(sim, settings);
+	code = code < 0 ? code : choose_loads(sim, settings);
+	code = code < 0 ? code : choose_rate(sim, settings);
+	code = code < 0 ? code : choose_end(sim, settings);
+	code = code < 0 ? code : start_parts(sim);
+	code = code < 0 ? code : set_metadata(sim, settings, device->metadata);
+	device->expected_scans = sim->scan_count;
+	device->modes = sim->modes;
+	device->has_detectors = true;
+	device->has_reference = sim->loads != NULL;
+	device->has_force = sim->loads == NULL && sim->bench->reference.present;
+	device->has_temperature = sim->bench->temperature.present;
+	return code;
+}
+
+static int sim_open(tactus_device *device, const char *address)
+{
+	tactus_sim *sim = calloc(1, sizeof(*sim));
+	if (sim == NULL)
+		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	const int code = tactus_bench_open(address[0] != '\0' ? address : "paredes", &sim->bench);
+	if (code < 0)
+		free(sim);
+	else
+		device->state = sim;
+	return code;
+}
+
+static void sim_close(tactus_device *device)
+{
+	tactus_sim *sim = device->state;
+	free_scan(sim);
+	tactus_bench_free(sim->bench);
+	free(sim);
+}
+
+static bool sim_list(bool (*found)(void *context, const char *uri, const char *description), void *context)
+{
+	for (const tactus_builtin *file = tactus_builtins; file->name != NULL; file++) {
+		char uri[64];
+		tactus_bench *bench = NULL;
+		if (strncmp(file->name, "loads-", 6) == 0 || tactus_bench_open(file->name, &bench) < 0)
+			continue;
+		snprintf(uri, sizeof(uri), "sim:%s", file->name);
+		const bool more = found(context, uri, bench->description != NULL ? bench->description : "");
+		tactus_bench_free(bench);
+		if (!more)
+			return false;
+	}
+	return true;
+}
+
+/* ---- a block of scans
+ * ------------------------------------------------------------------------------------------------ */
+
+/* What the instruments beside the sensors give: the reference on the row's channel, the thermometer. */
+static void read_instruments(tactus_sim *sim, const tactus_bench_sensor *sensor, uint64_t number, double time_s,
+							 tactus_reading *reading)
+{
+	const tactus_bench *bench = sim->bench;
+	if (bench->reference.present && sim->loads == NULL) {
+		const double load_N = sim_press_load_N(&sim->press, time_s - bench->reference.latency_s) * sensor->load_share;
+		const double noise_N = bench->reference.noise_N * tactus_random_normal(sim->seed, SIM_STREAM_REFERENCE, number);
+		reading->force_N = sim_round(load_N + noise_N, bench->reference.resolution_N);
+	}
+	if (bench->temperature.present) {
+		const double noise =
+			bench->temperature.noise_degC * tactus_random_normal(sim->seed, SIM_STREAM_TEMPERATURE, number);
+		reading->temperature_degC =
+			sim_round(sim_temperature_degC(bench, time_s) + noise, bench->temperature.resolution_degC);
+	}
+}
+
+/* A known load in the place of a sensor. */
+static void put_load(tactus_sim *sim, const tactus_load *load, size_t k)
+{
+	sim_block *block = &sim->block;
+	block->conductance_S[k] = isnan(load->resistance_ohm) ? 0 : 1 / load->resistance_ohm;
+	block->capacitance_F[k] = load->capacitance_F;
+	block->readings[k].reference_resistance_ohm = load->resistance_ohm;
+	block->readings[k].reference_capacitance_F = load->capacitance_F;
+}
+
+/* When and how each reading of one scan is taken, and the load at that instant. */
+static void plan_scan(tactus_sim *sim, uint64_t scan, size_t *next)
+{
+	static const enum tactus_mode modes[] = {TACTUS_MODE_DC, TACTUS_MODE_AC};
+	sim_block *block = &sim->block;
+	double time_s = (double)scan * sim->period_s, drive_V = sim->drive_V, frequency_Hz = sim->frequency_Hz;
+	tactus_loads_turn turn = {0};
+	if (sim->loads != NULL) {
+		turn = tactus_loads_turn_at(sim->loads, sim->channel_count, scan);
+		drive_V = sim->loads->drive_count > 0 ? sim->loads->drives_V[turn.drive] : drive_V;
+		frequency_Hz = sim->loads->frequency_count > 0 ? sim->loads->frequencies_Hz[turn.frequency] : frequency_Hz;
+	}
+	for (size_t position = 0; position < sim->channel_count; position++)
+		for (size_t m = 0; m < TACTUS_COUNT(modes); m++) {
+			if ((sim->modes & modes[m]) == 0)
+				continue;
+			const size_t k = (*next)++;
+			const bool dc = modes[m] == TACTUS_MODE_DC;
+			const double window_s = sim_window_s(sim->bench, dc ? 0 : frequency_Hz);
+			const double at_s = time_s + sim->settle_s + window_s / 2;
+			tactus_reading *reading = &block->readings[k];
+			*reading = (tactus_reading){at_s,
+										scan,
+										sim->scanned[position]->channel,
+										modes[m],
+										dc ? sim->dc_drive_V : drive_V,
+										dc ? 0 : frequency_Hz,
+										NAN,
+										NAN,
+										NAN,
+										NAN,
+										NAN,
+										NAN,
+										NAN,
+										NAN,
+										NAN,
+										TACTUS_QUALITY_OK};
+			time_s += sim->settle_s + window_s;
+			block->time_s[k] = at_s;
+			block->drive_V[k] = reading->drive_V;
+			block->frequency_Hz[k] = reading->frequency_Hz;
+			block->channel[k] = reading->channel;
+			block->temperature_degC[k] = sim_temperature_degC(sim->bench, at_s);
+			if (sim->loads != NULL)
+				put_load(sim, tactus_loads_at(sim->loads, sim->channel_count, &turn, position, sim->seed), k);
+			else
+				block->force_N[k] = sim_press_load_N(&sim->press, at_s);
+			read_instruments(sim, sim->scanned[position],
+							 scan * sim->channel_count * sim->mode_count + k % (sim->channel_count * sim->mode_count),
+							 at_s, reading);
+		}
+}
+
+/* Scans that the bench loses are taken and then forgotten. */
+static void drop_lost(tactus_sim *sim)
+{
+	sim_block *block = &sim->block;
+	size_t kept = 0;
+	for (size_t i = 0; i < block->count && sim->bench->lost_scans > 0; i++) {
+		const uint64_t scan = block->readings[i].sequence;
+		if (tactus_random_uniform(sim->seed, SIM_STREAM_LOST, scan) >= sim->bench->lost_scans)
+			block->readings[kept++] = block->readings[i];
+	}
+	if (sim->bench->lost_scans > 0)
+		block->count = kept;
+}
+
+static int fill_block(tactus_sim *sim)
+{
+	sim_block *block = &sim->block;
+	const size_t step = sim->channel_count * sim->mode_count;
+	int code = TACTUS_OK;
+	block->count = 0;
+	for (size_t i = 0; i < sim->block_scans && sim->next_scan < sim->scan_count; i++)
+		plan_scan(sim, sim->next_scan++, &block->count);
+	for (size_t i = 0; i < sim->channel_count && sim->loads == NULL && code >= 0; i++)
+		code = sim_sensor_run(&sim->sensors[i], block, i * sim->mode_count, sim->mode_count, step, sim->scratch);
+	for (size_t i = 0; i < block->count; i++)
+		block->resistance_ohm[i] = block->conductance_S[i] > 0 ? 1 / block->conductance_S[i] : 0;
+	if (code >= 0)
+		code = sim_electronics_run(&sim->electronics, block, sim->channel_count, sim->mode_count);
+	drop_lost(sim);
+	sim->delivered = 0;
+	return code;
+}
+
+static long sim_read(tactus_device *device, tactus_reading *readings, size_t max)
+{
+	tactus_sim *sim = device->state;
+	const size_t step = sim->channel_count * sim->mode_count;
+	while (sim->delivered == sim->block.count) {
+		if (sim->next_scan == sim->scan_count)
+			return 0;
+		const int code = fill_block(sim);
+		if (code < 0)
+			return code;
+	}
+	const tactus_reading *from = sim->block.readings + sim->delivered;
+	size_t n = sim->block.count - sim->delivered;
+	if (sim->realtime) {
+		/* one scan at a time, when its last reading has been taken */
+		n = 1;
+		while (sim->delivered + n < sim->block.count && from[n].sequence == from[0].sequence)
+			n++;
+		const int code = tactus_pace_wait(&sim->pace, from[n - 1].time_s);
+		if (code < 0)
+			return code;
+	}
+	if (n > max)
+		n = max < step ? max : max / step * step;
+	memcpy(readings, from, n * sizeof(*readings));
+	sim->delivered += n;
+	return (long)n;
+}
+
+const tactus_backend tactus_backend_sim = {
+	.scheme = "sim",
+	.list = sim_list,
+	.open = sim_open,
+	.start = sim_start,
+	.read = sim_read,
+	.close = sim_close,
+};
