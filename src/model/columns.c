@@ -113,20 +113,17 @@ const char *tactus_columns_where(const tactus_columns *columns)
 	return text;
 }
 
-/* Says what is missing, and what to do about it. */
-static int fail_missing(const tactus_columns *columns, const char *name)
+int tactus_columns_fail_missing(const tactus_columns *columns, const char *name)
 {
 	const tactus_table *table = columns->table;
 	const char *where = tactus_columns_where(columns);
 	if (tactus_table_find(table, name) >= 0)
 		return tactus_fail(TACTUS_ERR_INPUT, "%scolumn '%s' has no number in it", where, name);
-	if (strcmp(name, "conductance_S") == 0 &&
+	if ((strcmp(name, "conductance_S") == 0 || strcmp(name, "capacitance_F") == 0) &&
 		(tactus_table_find(table, "amplitude_V") >= 0 || tactus_table_find(table, "detector_amplitude_V") >= 0 ||
 		 tactus_table_find(table, "detector_dc_V") >= 0))
-		return tactus_fail(TACTUS_ERR_INPUT,
-						   "%sno column 'conductance_S' or 'capacitance_F', only the amplifier's volts: run `tactus "
-						   "convert` first",
-						   where);
+		return tactus_fail(TACTUS_ERR_INPUT, "%sno column '%s', only the readout's volts: run `tactus convert` first",
+						   where, name);
 	return tactus_fail(TACTUS_ERR_INPUT,
 					   "%sno column '%s', which domain '%s' needs (--input, --output or --columns name another)", where,
 					   name, columns->domain->name);
@@ -151,7 +148,7 @@ static void fail_domain(const tactus_table *table, const tactus_series_options *
 		rename_signals(options, &columns);
 		tactus_columns_find(table, &columns);
 		if (has_value(&columns, columns.input_signal)) {
-			fail_missing(&columns, what_misses(&columns, options->inputs_only, has_value));
+			tactus_columns_fail_missing(&columns, what_misses(&columns, options->inputs_only, has_value));
 			return;
 		}
 	}
@@ -200,7 +197,7 @@ int tactus_columns_bind(const tactus_table *table, const tactus_series_options *
 	rename_signals(options, columns);
 	tactus_columns_find(table, columns);
 	const char *missing = what_misses(columns, options->inputs_only, has_column);
-	return missing != NULL ? fail_missing(columns, missing) : TACTUS_OK;
+	return missing != NULL ? tactus_columns_fail_missing(columns, missing) : TACTUS_OK;
 }
 
 int tactus_columns_channel(const tactus_columns *columns, size_t row, int *channel)

@@ -28,6 +28,8 @@ void tactus_columns_of_domain(const tactus_domain *domain, tactus_columns *colum
 void tactus_columns_find(const tactus_table *table, tactus_columns *columns);
 /* The domain of the options or the columns, and its columns. TACTUS_ERR_INPUT if one that is needed is missing. */
 int tactus_columns_bind(const tactus_table *table, const tactus_series_options *options, tactus_columns *columns);
+/* TACTUS_ERR_INPUT: says that a column is missing, and what to do about it. */
+int tactus_columns_fail_missing(const tactus_columns *columns, const char *name);
 /* "FILE: ", or "" when the table came from none: what a message begins with. Valid until the next call. */
 const char *tactus_columns_where(const tactus_columns *columns);
 /* The channel of a row; TACTUS_ERR_INPUT with FILE:LINE if it is not a whole number. */

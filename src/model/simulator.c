@@ -87,6 +87,8 @@ int tactus_simulator_new(const tactus_model *model, tactus_table *block, uint64_
 		return tactus_fail(TACTUS_ERR_UNSUPPORTED,
 						   "a '%s' model turns readings into force and cannot be simulated: only a forward model can",
 						   tactus_form_name(model->form));
+	if (model->channel_count == 0)
+		return tactus_fail(TACTUS_ERR_DATA, "the model has no channel");
 	tactus_simulator *simulator = calloc(1, sizeof *simulator);
 	if (simulator != NULL)
 		simulator->model = tactus_model_copy(model);
@@ -139,7 +141,7 @@ static size_t channel_of(const tactus_simulator *simulator, const tactus_series 
 {
 	const tactus_model *model = simulator->model;
 	if (!numbered || model->domain != &tactus_domain_sensor)
-		return model->channel_count > 0 ? 0 : SIZE_MAX;
+		return 0;
 	const tactus_model_channel_data *data = tactus_model_find_channel(model, series->channel);
 	return data != NULL ? (size_t)(data - model->channels) : SIZE_MAX;
 }
