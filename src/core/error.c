@@ -49,7 +49,7 @@ const char *tactus_error_message(void)
 	return last_message;
 }
 
-int tactus_fail(int code, const char *format, ...)
+int(tactus_fail)(int code, const char *format, ...)
 {
 	char text[MESSAGE_SIZE]; /* the arguments may point into the present message */
 	va_list arguments;
@@ -60,7 +60,7 @@ int tactus_fail(int code, const char *format, ...)
 	return code;
 }
 
-int tactus_fail_prefix(int code, const char *format, ...)
+int(tactus_fail_prefix)(int code, const char *format, ...)
 {
 	char text[MESSAGE_SIZE];
 	va_list arguments;

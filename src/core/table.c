@@ -70,8 +70,8 @@ const char *tactus_table_name(const tactus_table *table, size_t column)
 
 static enum tactus_column_type type_of(const struct tactus_column *column)
 {
-	return column->kind == TACTUS_KIND_NUMBER || column->kind == TACTUS_KIND_GUESS_NUMBER ? TACTUS_COLUMN_NUMBER
-																						  : TACTUS_COLUMN_TEXT;
+	return column->kind == TACTUS_KIND_TEXT || column->kind == TACTUS_KIND_GUESS_TEXT ? TACTUS_COLUMN_TEXT
+																					  : TACTUS_COLUMN_NUMBER;
 }
 
 enum tactus_column_type tactus_table_type(const tactus_table *table, size_t column)
@@ -205,7 +205,7 @@ void tactus_table_clear(tactus_table *table)
 	for (size_t i = 0; i < table->column_count; i++) {
 		struct tactus_column *column = &table->columns[i];
 		column->in_lines = table->offsets && column->source >= 0;
-		if (column->source >= 0)
+		if (column->origin >= 0)
 			column->kind = column->source_kind;
 		column->numbers_valid = column->texts_valid = false;
 	}
@@ -226,8 +226,8 @@ struct tactus_column *tactus_table_add(tactus_table *table, const char *name, en
 	if (!copy)
 		return NULL;
 	struct tactus_column *column = &table->columns[table->column_count++];
-	*column =
-		(struct tactus_column){.name = copy, .kind = kind, .source_kind = kind, .source = -1, .scale = 1, .divisor = 1};
+	*column = (struct tactus_column){
+		.name = copy, .kind = kind, .source_kind = kind, .origin = -1, .source = -1, .scale = 1, .divisor = 1};
 	return column;
 }
 
@@ -305,8 +305,7 @@ char *tactus_table_keep(tactus_table *table, const char *text, size_t length)
 	return copy;
 }
 
-/* "" inside a quoted field is one quote; false when memory runs out. */
-static bool undouble(tactus_table *table, tactus_text *text)
+bool tactus_undouble(tactus_table *table, tactus_text *text)
 {
 	if (!memchr(text->text, '"', text->length))
 		return true;
@@ -322,27 +321,23 @@ static bool undouble(tactus_table *table, tactus_text *text)
 	return true;
 }
 
-double tactus_column_scale(const struct tactus_column *column, double number)
-{
-	return column->scaled ? number * column->scale / column->divisor : number;
-}
-
-/* The lexer has checked the field: a number or missing. Fields repeat (drive, frequency), so remember the last one. */
+/* The reader has checked the fields: numbers, or nothing. Many repeat (drive, frequency), so the last is remembered. */
 static void parse_numbers(const tactus_table *table, struct tactus_column *column)
 {
 	tactus_text last = {"", 0};
-	double last_number = NAN;
+	double number = NAN;
 	for (size_t r = 0; r < table->rows; r++) {
 		tactus_text field = tactus_table_field(table, r, (size_t)column->source);
 		if (field.length != last.length || memcmp(field.text, last.text, field.length) != 0) {
 			bool quoted;
 			tactus_text text = tactus_field_trim(field, &quoted);
-			double number;
-			last_number =
-				tactus_parse_number(text.text, text.length, &number) ? tactus_column_scale(column, number) : NAN;
+			if (!tactus_parse_number(text.text, text.length, &number))
+				number = NAN;
+			else if (column->scaled)
+				number = number * column->scale / column->divisor;
 			last = field;
 		}
-		column->numbers[r] = last_number;
+		column->numbers[r] = number;
 	}
 }
 
@@ -367,11 +362,29 @@ const tactus_text *tactus_column_texts(tactus_table *table, struct tactus_column
 	for (size_t r = 0; !column->texts_valid && column->in_lines && r < table->rows; r++) {
 		bool quoted;
 		column->texts[r] = tactus_field_trim(tactus_table_field(table, r, (size_t)column->source), &quoted);
-		if (quoted && !undouble(table, &column->texts[r]))
+		if (quoted && !tactus_undouble(table, &column->texts[r]))
 			return NULL;
 	}
 	column->texts_valid = true;
 	return column->texts;
+}
+
+bool tactus_column_to_texts(tactus_table *table, struct tactus_column *column, size_t rows)
+{
+	if (!tactus_column_text_array(table, column))
+		return false;
+	for (size_t r = 0; r < rows; r++) {
+		char number[TACTUS_NUMBER_SIZE];
+		size_t length = tactus_format_number(column->numbers[r], number);
+		char *copy = tactus_table_keep(table, number, length);
+		if (!copy)
+			return false;
+		column->texts[r] = (tactus_text){copy, length};
+	}
+	column->kind = column->source_kind = TACTUS_KIND_GUESS_TEXT;
+	column->texts_valid = true;
+	column->numbers_valid = false;
+	return true;
 }
 
 /* ---- what a column's name says ---- */

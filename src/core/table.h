@@ -19,7 +19,8 @@ enum tactus_column_kind {
 struct tactus_column {
 	char *name;
 	enum tactus_column_kind kind;
-	long source; /* index of its field in the lines or records of the file, −1: not from the file */
+	long origin;                         /* which column of the file it is (index in the layout), −1: none */
+	long source;                         /* index of its field in the lines, −1: it has no single one */
 	enum tactus_column_kind source_kind; /* what the file's values are, should the caller replace the column */
 	bool in_lines;                       /* the values are still in the lines */
 	double scale;                        /* what a number of the file is multiplied by … */
@@ -68,12 +69,14 @@ tactus_text *tactus_column_text_array(tactus_table *table, struct tactus_column 
 tactus_text tactus_table_field(const tactus_table *table, size_t row, size_t field);
 /* The field without blanks around it and quotes. */
 tactus_text tactus_field_trim(tactus_text field, bool *quoted);
+/* Makes the doubled quotes of a quoted field single ones; false when memory runs out. */
+bool tactus_undouble(tactus_table *table, tactus_text *text);
 /* A copy of text that lives until the table is cleared or freed; NULL when memory runs out. */
 char *tactus_table_keep(tactus_table *table, const char *text, size_t length);
 /* The values of a column, parsed if they were still in the lines; NULL when memory runs out. */
 const double *tactus_column_numbers(tactus_table *table, struct tactus_column *column);
 const tactus_text *tactus_column_texts(tactus_table *table, struct tactus_column *column);
-/* A number of the file in the column's unit. */
-double tactus_column_scale(const struct tactus_column *column, double number);
+/* A column of numbers in rows [0, rows) becomes one of texts; false when memory runs out. */
+bool tactus_column_to_texts(tactus_table *table, struct tactus_column *column, size_t rows);
 
 #endif
