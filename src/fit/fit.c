@@ -1,0 +1,614 @@
+/* Calibration: what a recording allows, every kind of model fitted to it, and the errors in newtons side by side. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <tactus/version.h>
+
+#include "core/core.h"
+#include "fit/fit_work.h"
+
+enum { FOLDS = 5, STARTS = 20 };
+
+typedef struct {
+	const char *name, *summary;
+	enum tactus_form form;
+	bool conductance, capacitance;
+	const char *effects;
+} kind;
+
+static const kind kinds[] = {
+	{"conductance", "G = g0 + g1 F, inverted", TACTUS_FORM_FORWARD, true, false, NULL},
+	{"capacitance", "C = c0 + c1 F, inverted", TACTUS_FORM_FORWARD, false, true, NULL},
+	{"average", "mean of the forces of conductance and capacitance", TACTUS_FORM_AVERAGE, true, true, NULL},
+	{"weighted", "the same with inverse-variance weights (best if their errors are uncorrelated)", TACTUS_FORM_WEIGHTED,
+	 true, true, NULL},
+	{"linear", "regression of the force on both readings: F = f0 + fg G + fc C", TACTUS_FORM_LINEAR, true, true, NULL},
+	{"network", "2-2-1 network of both readings", TACTUS_FORM_NETWORK, true, true, NULL},
+	{"power", "G = g0 + g1 F0 (F/F0)^n: conductance with the effect nonlinearity", TACTUS_FORM_FORWARD, true, false,
+	 "nonlinearity"},
+	{"forward", "every output of the domain, with shared effects", TACTUS_FORM_FORWARD, true, true, NULL},
+};
+
+struct tactus_fit_result {
+	tactus_model *model;
+	tactus_fit_channel *channels;
+	char **problem;
+	char (*column)[TACTUS_FIT_OUTPUTS][64];
+	size_t count;
+};
+
+const char *tactus_fit_model_at(size_t i, const char **summary)
+{
+	if (i >= TACTUS_COUNT(kinds))
+		return NULL;
+	if (summary)
+		*summary = kinds[i].summary;
+	return kinds[i].name;
+}
+
+/* ---- the plan ---------------------------------------------------------------------------------------------------- */
+
+static int find_kind(const char *name, const kind **found)
+{
+	char known[160] = "";
+	for (size_t i = 0; i < TACTUS_COUNT(kinds); i++) {
+		if (strcmp(kinds[i].name, name) == 0) {
+			*found = &kinds[i];
+			return TACTUS_OK;
+		}
+		snprintf(known + strlen(known), sizeof known - strlen(known), "%s%s", i ? ", " : "", kinds[i].name);
+	}
+	return tactus_fail(TACTUS_ERR_ARGUMENT, "unknown model '%s'; there are %s", name, known);
+}
+
+/* In the order of the stages, as a chain wants them. */
+static int add_effect(tactus_plan *plan, const tactus_effect *effect)
+{
+	size_t at = plan->effect_count;
+	for (size_t k = 0; k < plan->effect_count; k++)
+		if (plan->effects[k] == effect)
+			return tactus_fail(TACTUS_ERR_ARGUMENT, "effect '%s' is there twice", effect->name);
+	if (at == TACTUS_EFFECTS_MAX)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "a model holds at most %d effects", TACTUS_EFFECTS_MAX);
+	for (; at > 0 && plan->effects[at - 1]->stage > effect->stage; at--)
+		plan->effects[at] = plan->effects[at - 1];
+	plan->effects[at] = effect;
+	plan->effect_count++;
+	return TACTUS_OK;
+}
+
+static int add_effects(tactus_plan *plan, const tactus_domain *domain, const char *list)
+{
+	int status = TACTUS_OK;
+	while (list && *list && status == TACTUS_OK) {
+		size_t length = strcspn(list, ",");
+		char *name = tactus_strndup(list, length);
+		if (!name)
+			return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+		const tactus_effect *effect = tactus_effect_find(domain, name);
+		status = effect ? add_effect(plan, effect) : TACTUS_ERR_ARGUMENT; /* the message lists them */
+		free(name);
+		list += length + (list[length] == ',');
+	}
+	return status;
+}
+
+static int plan_of_start(tactus_plan *plan, const tactus_domain *domain, const tactus_model *start)
+{
+	if (start->form != TACTUS_FORM_FORWARD)
+		return tactus_fail(TACTUS_ERR_UNSUPPORTED,
+						   "a model of the form '%s' cannot be refitted; fit it with --model %s",
+						   tactus_form_name(start->form), tactus_form_name(start->form));
+	if (start->domain != domain)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "the model is of the domain %s, the recording of %s",
+						   start->domain->name, domain->name);
+	plan->start = start;
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++)
+		plan->outputs[o] = start->output_name[o] != NULL;
+	int status = TACTUS_OK;
+	for (size_t k = 0; k < start->effect_count && status == TACTUS_OK; k++)
+		status = add_effect(plan, start->effects[k]);
+	return status;
+}
+
+static int make_plan(const tactus_fit_options *options, const tactus_series *series, const kind *k, tactus_plan *plan)
+{
+	const tactus_domain *domain = series->domain;
+	*plan = (tactus_plan){.form = k->form};
+	int status = TACTUS_OK;
+	if (options->start) {
+		status = plan_of_start(plan, domain, options->start);
+	} else if (domain == &tactus_domain_sensor) {
+		plan->outputs[0] = k->conductance;
+		plan->outputs[1] = k->capacitance;
+		status = add_effects(plan, domain, k->effects);
+	} else {
+		for (size_t o = 0; tactus_output_signal(domain, o) != SIZE_MAX; o++)
+			plan->outputs[o] = series->output_name[o] && series->output_name[o][0];
+	}
+	if (status == TACTUS_OK && plan->form != TACTUS_FORM_FORWARD && options->effects)
+		status = tactus_fail(TACTUS_ERR_ARGUMENT, "the model '%s' takes no effects: it goes from readings to force",
+							 k->name);
+	return status == TACTUS_OK ? add_effects(plan, domain, options->effects) : status;
+}
+
+/* ---- what the data cannot support ----------------------------------------------------------------------------------
+ */
+
+static size_t parameter_count(const tactus_domain *domain, const tactus_plan *plan)
+{
+	if (plan->form == TACTUS_FORM_LINEAR)
+		return 3;
+	if (plan->form == TACTUS_FORM_NETWORK)
+		return TACTUS_NETWORK_WEIGHTS;
+	return tactus_forward_parameters(domain, plan->effects, plan->effect_count, plan->outputs);
+}
+
+static const char *output_label(const tactus_series *series, size_t o)
+{
+	const char *name = series->output_name[o];
+	return name && name[0] ? name : series->domain->signals[tactus_output_signal(series->domain, o)].name;
+}
+
+static bool wanted(const tactus_plan *plan, const tactus_points *points, size_t p)
+{
+	bool any = false, all = true;
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
+		if (!plan->outputs[o])
+			continue;
+		bool there = isfinite(points->reading[o][p]);
+		any = any || there;
+		all = all && there;
+	}
+	return isfinite(points->input[p]) && (plan->form == TACTUS_FORM_FORWARD ? any : all);
+}
+
+typedef struct {
+	double low, high, mean, square;
+	size_t n;
+} moments;
+
+static moments moments_of(const double *x, const bool *use, size_t n)
+{
+	moments m = {INFINITY, -INFINITY, 0, 0, 0};
+	for (size_t i = 0; i < n; i++) {
+		if (!use[i] || isnan(x[i]))
+			continue;
+		m.n++;
+		m.low = fmin(m.low, x[i]);
+		m.high = fmax(m.high, x[i]);
+		double from = x[i] - m.mean;
+		m.mean += from / (double)m.n;
+		m.square += from * (x[i] - m.mean);
+	}
+	return m;
+}
+
+/* t of the correlation between force and reading: below three the reading does not follow the force. */
+static double follows(const double *x, const double *y, const bool *use, size_t n)
+{
+	moments mx = moments_of(x, use, n), my = moments_of(y, use, n);
+	double product = 0;
+	size_t count = 0;
+	for (size_t i = 0; i < n; i++) {
+		if (!use[i] || isnan(x[i]) || isnan(y[i]))
+			continue;
+		product += (x[i] - mx.mean) * (y[i] - my.mean);
+		count++;
+	}
+	double r = product / sqrt(mx.square * my.square);
+	return fabs(r) * sqrt((double)(count - 2) / fmax(1 - r * r, 1e-300));
+}
+
+static char *reading_problem(const tactus_series *series, const tactus_points *points, const bool *use, size_t o)
+{
+	char low[TACTUS_NUMBER_SIZE];
+	const char *name = output_label(series, o);
+	if (!series->output_name[o] || !series->output_name[o][0])
+		return tactus_asprintf("the recording has no %s", name);
+	moments m = moments_of(points->reading[o], use, points->n);
+	tactus_format_number(m.low, low);
+	if (m.n == 0)
+		return tactus_asprintf("no usable %s (%zu readings are clipped, wrong-signed or missing)", name,
+							   points->left_out);
+	if (m.low == m.high)
+		return tactus_asprintf("%s is %s in all %zu readings: the channel is %s", name, low, m.n,
+							   m.low == 0 ? "open" : "dead");
+	if (series->domain == &tactus_domain_sensor && follows(points->input, points->reading[o], use, points->n) < 3)
+		return tactus_asprintf("%s does not follow the force: the channel is dead or open", name);
+	return NULL;
+}
+
+/* Why a channel cannot be fitted; NULL if it can. */
+static char *channel_problem(const tactus_plan *plan, const tactus_series *series, const tactus_points *points,
+							 const bool *use)
+{
+	size_t n = 0, needed = 2 * parameter_count(series->domain, plan);
+	for (size_t p = 0; p < points->n; p++)
+		n += use[p];
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++)
+		if (plan->outputs[o] && (!series->output_name[o] || !series->output_name[o][0]))
+			return reading_problem(series, points, use, o);
+	if (n < needed)
+		return tactus_asprintf("%zu points are too few: %zu parameters need at least %zu (%zu readings were left out: "
+							   "clipped, wrong-signed or missing)",
+							   n, needed / 2, needed, points->left_out);
+	moments force = moments_of(points->input, use, points->n);
+	char text[TACTUS_NUMBER_SIZE];
+	tactus_format_number(force.mean, text);
+	if (series->domain == &tactus_domain_sensor && !(force.high - force.low > 1e-9 * fabs(force.mean)))
+		return tactus_asprintf("%s never varies: it is %s in all %zu points", series->input_name, text, n);
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
+		char *problem = plan->outputs[o] ? reading_problem(series, points, use, o) : NULL;
+		if (problem)
+			return problem;
+	}
+	for (size_t k = 0; k < plan->effect_count; k++) {
+		const char *why = plan->effects[k]->testable(series);
+		if (why)
+			return tactus_asprintf("%s cannot be fitted: %s", plan->effects[k]->name, why);
+	}
+	return NULL;
+}
+
+/* ---- a fit at work ------------------------------------------------------------------------------------------------
+ */
+
+static void work_free(tactus_work *work)
+{
+	for (size_t c = 0; c < work->count; c++) {
+		if (work->points)
+			tactus_points_free(&work->points[c]);
+		if (work->folds)
+			tactus_folds_free(&work->folds[c]);
+		if (work->use)
+			free(work->use[c]);
+		if (work->problem)
+			free(work->problem[c]);
+	}
+	free(work->points);
+	free(work->folds);
+	free((void *)work->use);
+	free((void *)work->problem);
+}
+
+static int work_new(tactus_work *work, const tactus_plan *plan, int folds)
+{
+	work->points = calloc(work->count, sizeof *work->points);
+	work->folds = calloc(work->count, sizeof *work->folds);
+	work->use = calloc(work->count, sizeof *work->use);
+	work->problem = calloc(work->count, sizeof *work->problem);
+	if (!work->points || !work->folds || !work->use || !work->problem)
+		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	for (size_t c = 0; c < work->count; c++) {
+		tactus_points *points = &work->points[c];
+		int status = tactus_points_new(&work->series[c], work->recording, points);
+		if (status == TACTUS_OK)
+			status = tactus_folds_new(points->input, points->n, folds, &work->folds[c]);
+		work->use[c] = status == TACTUS_OK ? calloc(points->n + 1, sizeof(bool)) : NULL;
+		if (!work->use[c])
+			return status < 0 ? status : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+		for (size_t p = 0; p < points->n; p++)
+			work->use[c][p] = wanted(plan, points, p);
+		work->problem[c] = channel_problem(plan, &work->series[c], points, work->use[c]);
+		if (!work->parameters_only && work->folds[c].count > work->fold_count)
+			work->fold_count = work->folds[c].count;
+	}
+	return TACTUS_OK;
+}
+
+/* ---- the result ----------------------------------------------------------------------------------------------------
+ */
+
+static double root(double square)
+{
+	return sqrt(square);
+}
+
+static void score_outputs(const tactus_plan *plan, const tactus_points *points, const tactus_outcome *outcome,
+						  tactus_fit_channel *channel)
+{
+	double *zero = calloc(points->n + 1, sizeof *zero);
+	for (size_t o = 0; zero && o < TACTUS_FIT_OUTPUTS; o++) {
+		if (!plan->outputs[o] || plan->form != TACTUS_FORM_FORWARD)
+			continue;
+		channel->outputs[o].rmse = root(tactus_mean_square(outcome->residual[o], zero, points->n, NULL));
+		channel->outputs[o].cv_rmse = root(tactus_mean_square(outcome->cv_residual[o], zero, points->n, NULL));
+	}
+	free(zero);
+}
+
+static void score_force(const tactus_points *points, const tactus_outcome *own, const tactus_outcome *conductance,
+						const tactus_outcome *capacitance, tactus_fit_channel *channel)
+{
+	size_t n = points->n;
+	const double *reference = own->reference_N;
+	double mse = tactus_mean_square(own->estimate_N, reference, n, &channel->samples);
+	double cv_mse = tactus_mean_square(own->cv_estimate_N, reference, n, NULL);
+	channel->rmse_N = root(mse);
+	channel->cv_rmse_N = root(cv_mse);
+	if (conductance) {
+		channel->reference_mse_N2 = tactus_mean_square(conductance->estimate_N, conductance->reference_N, n, NULL);
+		channel->reference_cv_mse_N2 =
+			tactus_mean_square(conductance->cv_estimate_N, conductance->reference_N, n, NULL);
+		channel->error_reduction = 1 - mse / channel->reference_mse_N2;
+		channel->cv_error_reduction = 1 - cv_mse / channel->reference_cv_mse_N2;
+	}
+	if (conductance && capacitance) {
+		double ignored;
+		channel->bound = tactus_combination_bound(conductance->estimate_N, capacitance->estimate_N, points->input, n,
+												  &channel->correlation);
+		channel->cv_bound = tactus_combination_bound(conductance->cv_estimate_N, capacitance->cv_estimate_N,
+													 points->input, n, &ignored);
+	}
+	tactus_static_figures_of(n, points->time_s, reference, own->estimate_N, &channel->figures);
+}
+
+static tactus_fit_channel blank(int number)
+{
+	tactus_fit_channel c = {.channel = number};
+	c.rmse_N = c.cv_rmse_N = c.reference_mse_N2 = c.reference_cv_mse_N2 = c.error_reduction = c.cv_error_reduction =
+		c.bound = c.cv_bound = c.correlation = NAN;
+	c.figures = (tactus_static_figures){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NULL, NULL, NULL};
+	for (size_t o = 0; o < TACTUS_FIT_OUTPUTS; o++)
+		c.outputs[o].rmse = c.outputs[o].cv_rmse = NAN;
+	return c;
+}
+
+/* What the model file says of the calibration of a channel. */
+static void note_calibration(const tactus_work *work, const tactus_plan *plan, size_t c,
+							 const tactus_fit_channel *channel, tactus_model_channel_data *data)
+{
+	const tactus_points *points = &work->points[c];
+	moments force = moments_of(points->input, work->use[c], points->n);
+	data->samples = force.n;
+	data->input_min = force.low;
+	data->input_max = force.high;
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
+		moments m = moments_of(points->reading[o], work->use[c], points->n);
+		if (!plan->outputs[o] || m.n == 0)
+			continue;
+		data->output_min[o] = m.low;
+		data->output_max[o] = m.high;
+	}
+	data->rmse_N = channel->rmse_N;
+	data->cv_rmse_N = channel->cv_rmse_N;
+	if (plan->form != TACTUS_FORM_FORWARD && isfinite(channel->rmse_N))
+		data->force_std_N = isfinite(channel->cv_rmse_N) ? channel->cv_rmse_N : channel->rmse_N;
+}
+
+static uint64_t fnv1a(uint64_t hash, const void *bytes, size_t n)
+{
+	for (const unsigned char *b = bytes; n--; b++)
+		hash = (hash ^ *b) * UINT64_C(0x100000001b3);
+	return hash;
+}
+
+/* 64-bit FNV-1a over channel, clock, input and outputs of every series: the same numbers give the same fingerprint. */
+static void fingerprint(const tactus_work *work, char text[17])
+{
+	uint64_t hash = UINT64_C(0xcbf29ce484222325);
+	for (size_t c = 0; c < work->count; c++) {
+		const tactus_series *s = &work->series[c];
+		hash = fnv1a(hash, &s->channel, sizeof s->channel);
+		for (size_t i = 0; i < s->domain->signal_count; i++) {
+			enum tactus_role role = s->domain->signals[i].role;
+			bool used = role == TACTUS_ROLE_TIME || role == TACTUS_ROLE_INPUT || role == TACTUS_ROLE_OUTPUT;
+			for (size_t k = 0; used && s->signal[i] && k < s->n; k++) {
+				double value = isnan(s->signal[i][k]) ? INFINITY : s->signal[i][k]; /* one pattern for missing */
+				hash = fnv1a(hash, &value, sizeof value);
+			}
+		}
+	}
+	snprintf(text, 17, "%016llx", (unsigned long long)hash);
+}
+
+static int note_provenance(const tactus_work *work, const char *kind_name, tactus_model *model)
+{
+	char date[32], print[17];
+	time_t now = time(NULL);
+	struct tm utc;
+	strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &utc));
+	fingerprint(work, print);
+	tactus_metadata *from = tactus_table_metadata(work->recording), *to = model->provenance;
+	const char *start = tactus_metadata_get(from, "start"), *path = tactus_table_file(work->recording);
+	const char *slash = strrchr(path, '/');
+	const char *const pairs[][2] = {
+		{"model", kind_name},
+		{"recording", slash ? slash + 1 : path},
+		{"recording_fingerprint", print},
+		{"date", start ? start : date},
+		{"device", tactus_metadata_get(from, "device")},
+		{"version", TACTUS_VERSION},
+	};
+	int status = TACTUS_OK;
+	for (size_t i = 0; i < TACTUS_COUNT(pairs) && status >= 0; i++)
+		if (pairs[i][1])
+			status = tactus_metadata_set(to, pairs[i][0], pairs[i][1]);
+	return status < 0 ? status : TACTUS_OK;
+}
+
+/* Channels with a problem are not in the model. */
+static void drop_failed(tactus_model *model, char *const *problem)
+{
+	size_t kept = 0;
+	for (size_t c = 0; c < model->channel_count; c++)
+		if (!problem[c])
+			model->channels[kept++] = model->channels[c];
+	model->channel_count = kept;
+}
+
+static int none_left(const tactus_work *work)
+{
+	for (size_t c = 0; c < work->count; c++)
+		if (!work->problem[c])
+			return TACTUS_OK;
+	return tactus_fail(TACTUS_ERR_DATA, "channel %d: %s%s", work->series[0].channel, work->problem[0],
+					   work->count > 1 ? " (and no other channel can be fitted)" : "");
+}
+
+/* The plain conductance or capacitance model on the same points, to compare with; NULL where it makes no sense. */
+static int reference(const tactus_work *work, size_t o, tactus_outcome **outcome)
+{
+	const tactus_series *series = &work->series[0];
+	*outcome = NULL;
+	if (work->parameters_only || series->domain != &tactus_domain_sensor || !series->output_name[o] ||
+		!series->output_name[o][0])
+		return TACTUS_OK;
+	tactus_plan plan = {.form = TACTUS_FORM_FORWARD};
+	plan.outputs[o] = true;
+	tactus_model *model = NULL;
+	*outcome = calloc(work->count, sizeof **outcome);
+	int status = *outcome ? tactus_plan_run(work, &plan, &model, *outcome, NULL) : TACTUS_ERR_MEMORY;
+	tactus_model_free(model);
+	return status;
+}
+
+typedef struct {
+	const tactus_plan *plan;
+	const char *name;
+	tactus_outcome *own, *conductance, *capacitance;
+} outcomes;
+
+static int make_result(tactus_work *work, const outcomes *o, tactus_model *model, tactus_fit_result **result)
+{
+	tactus_fit_result *r = calloc(1, sizeof *r);
+	if (r) {
+		r->count = work->count;
+		r->channels = calloc(work->count, sizeof *r->channels);
+		r->column = calloc(work->count, sizeof *r->column);
+	}
+	if (!r || !r->channels || !r->column) {
+		if (r) {
+			free(r->channels);
+			free(r->column);
+		}
+		free(r);
+		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	}
+	for (size_t c = 0; c < work->count; c++) {
+		tactus_fit_channel *channel = &r->channels[c];
+		*channel = blank(work->series[c].channel);
+		channel->left_out = work->points[c].left_out;
+		channel->ill_conditioned = work->points[c].ill_conditioned;
+		channel->stretches = work->folds[c].count ? work->folds[c].stretches : NULL;
+		channel->problem = work->problem[c];
+		for (size_t i = 0; i < TACTUS_FIT_OUTPUTS; i++)
+			if (o->plan->outputs[i] && o->plan->form == TACTUS_FORM_FORWARD) {
+				snprintf(r->column[c][i], sizeof r->column[c][i], "%s", output_label(&work->series[c], i));
+				channel->outputs[i].column = r->column[c][i];
+			}
+		if (channel->problem)
+			continue;
+		score_outputs(o->plan, &work->points[c], &o->own[c], channel);
+		if (work->series[0].domain == &tactus_domain_sensor)
+			score_force(&work->points[c], &o->own[c], o->conductance ? &o->conductance[c] : NULL,
+						o->capacitance ? &o->capacitance[c] : NULL, channel);
+		note_calibration(work, o->plan, c, channel, &model->channels[c]);
+		if (!channel->samples)
+			channel->samples = model->channels[c].samples;
+	}
+	r->problem = work->problem;
+	work->problem = NULL;
+	drop_failed(model, r->problem);
+	r->model = model;
+	*result = r;
+	return TACTUS_OK;
+}
+
+static int run_work(tactus_work *work, const tactus_plan *plan, const char *name, tactus_fit_result **result)
+{
+	outcomes o = {.plan = plan, .name = name};
+	tactus_model *model = NULL;
+	o.own = calloc(work->count, sizeof *o.own);
+	int status = o.own ? none_left(work) : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	if (status == TACTUS_OK)
+		status = tactus_plan_run(work, plan, &model, o.own, work->problem);
+	if (status == TACTUS_OK)
+		status = none_left(work);
+	if (status == TACTUS_OK)
+		status = reference(work, 0, &o.conductance);
+	if (status == TACTUS_OK)
+		status = reference(work, 1, &o.capacitance);
+	if (status == TACTUS_OK)
+		status = note_provenance(work, name, model);
+	if (status == TACTUS_OK)
+		status = make_result(work, &o, model, result);
+	if (status != TACTUS_OK)
+		tactus_model_free(model);
+	tactus_outcome_free(o.own, work->count);
+	tactus_outcome_free(o.conductance, work->count);
+	tactus_outcome_free(o.capacitance, work->count);
+	return status;
+}
+
+int tactus_fit(const tactus_table *recording, const tactus_fit_options *options, tactus_fit_result **result)
+{
+	static const tactus_fit_options defaults = {0};
+	const tactus_fit_options *o = options ? options : &defaults;
+	const kind *k = NULL;
+	tactus_series *series = NULL;
+	size_t count = 0;
+	tactus_plan plan;
+	int folds = o->folds ? o->folds : FOLDS;
+	if (folds < 2 || folds > TACTUS_FOLDS_MAX)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "%d folds: a cross-validation has 2 to %d", folds, TACTUS_FOLDS_MAX);
+	int status = find_kind(o->model ? o->model : "conductance", &k);
+	if (status != TACTUS_OK)
+		return status;
+	tactus_series_options columns = {.domain = o->domain, .input = o->input, .output = o->output};
+	if (o->start && !columns.input)
+		columns.input = o->start->input_name;
+	if (o->start && !columns.output && o->start->output_name[0] && o->start->output_name[0][0])
+		columns.output = o->start->output_name[0];
+	status = tactus_series_split(recording, &columns, &series, &count);
+	if (status < 0)
+		return status;
+	status = make_plan(o, &series[0], k, &plan);
+	if (status == TACTUS_OK) {
+		tactus_work work = {.recording = recording,
+							.series = series,
+							.count = count,
+							.seed = o->seed,
+							.jobs = o->jobs,
+							.starts = o->starts > 0 ? (size_t)o->starts : STARTS,
+							.parameters_only = o->parameters_only};
+		status = work_new(&work, &plan, folds);
+		if (status == TACTUS_OK)
+			status = run_work(&work, &plan, o->start ? "refit" : k->name, result);
+		work_free(&work);
+	}
+	tactus_series_free(series, count);
+	return status;
+}
+
+void tactus_fit_free(tactus_fit_result *result)
+{
+	if (!result)
+		return;
+	for (size_t c = 0; c < result->count; c++)
+		free(result->problem[c]);
+	free((void *)result->problem);
+	free(result->channels);
+	free(result->column);
+	tactus_model_free(result->model);
+	free(result);
+}
+
+size_t tactus_fit_channels(const tactus_fit_result *result)
+{
+	return result->count;
+}
+
+const tactus_fit_channel *tactus_fit_channel_at(const tactus_fit_result *result, size_t i)
+{
+	return i < result->count ? &result->channels[i] : NULL;
+}
+
+const tactus_model *tactus_fit_model(const tactus_fit_result *result)
+{
+	return result->model;
+}
