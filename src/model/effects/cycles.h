@@ -81,17 +81,16 @@ static inline void tactus_cycles_confirm(const double *p, double *state, double 
 	state[CYCLES_SINCE] += dt;
 	state[CYCLES_LOW] = fmin(state[CYCLES_LOW], force);
 	state[CYCLES_HIGH] = fmax(state[CYCLES_HIGH], force);
-	bool fell = force<state[CYCLES_HIGH] - h, rose = force> state[CYCLES_LOW] + h;
-	if (state[CYCLES_DIRECTION] > 0 && fell) {
-		state[CYCLES_PEAK] = state[CYCLES_HIGH];
-		state[CYCLES_SINCE] = 0;
-	} else if (state[CYCLES_DIRECTION] < 0 && rose) {
-		state[CYCLES_VALLEY] = state[CYCLES_LOW];
-		state[CYCLES_SINCE] = 0;
-	} else if (state[CYCLES_DIRECTION] != 0 || !(fell || rose)) {
+	double direction = state[CYCLES_DIRECTION];
+	bool peak = direction >= 0 && state[CYCLES_HIGH] - force > h;
+	bool valley = !peak && direction <= 0 && force - state[CYCLES_LOW] > h;
+	if (!peak && !valley)
 		return;
+	if (direction != 0) { /* the first movement shows a direction, not a turn */
+		state[peak ? CYCLES_PEAK : CYCLES_VALLEY] = state[peak ? CYCLES_HIGH : CYCLES_LOW];
+		state[CYCLES_SINCE] = 0;
 	}
-	state[CYCLES_DIRECTION] = fell ? -1 : 1;
+	state[CYCLES_DIRECTION] = peak ? -1 : 1;
 	state[CYCLES_LOW] = state[CYCLES_HIGH] = force;
 }
 
