@@ -11,14 +11,13 @@ static const tactus_parameter parameters[] = {
 
 /*
  * max(0, F − Fd) with its corner rounded to a hyperbola, shifted to pass through 0 and odd below 0:
- * s(F − Fd) − s(−Fd), s(u) = (u + √(u² + w²))/2, w = relative width · Fd. Strictly rising, so that it has an inverse,
- * if an uncertain one below Fd; at Fd = 0 it is F for either sign.
+ * s(F − Fd) − s(−Fd), s(u) = (u + √(u² + w²))/2, w = relative width · Fd, here without the difference of the two roots.
+ * Strictly rising, so that it has an inverse, if an uncertain one below Fd; at Fd = 0 it is F for either sign.
  */
 static double soften(double force, double load, double width)
 {
-	double rounded = 0.5 * (force - load + hypot(force - load, width));
-	double at_zero = 0.5 * width * width / (hypot(load, width) + load); /* s(−Fd) without cancellation */
-	return rounded - at_zero;
+	double roots = hypot(force - load, width) + hypot(load, width);
+	return 0.5 * force * (1 + (force - 2 * load) / roots);
 }
 
 static void process(const double *p, double *state, size_t n, double *const *signal)
