@@ -157,5 +157,5 @@ int tactus_device_table(const tactus_device *device, const tactus_reading *readi
 	put(&j, device->has_temperature, "temperature_degC", temperature_degC);
 	put(&j, device->has_reference, "reference_resistance_ohm", reference_resistance_ohm);
 	put(&j, device->has_reference, "reference_capacitance_F", reference_capacitance_F);
-	return j.code;
+	return j.code < 0 ? j.code : TACTUS_OK;
 }

@@ -1,0 +1,506 @@
+/* tactus scan: multiplexed acquisition from a device into a recording, converted to R, C, G and newtons on the way. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "cli.h"
+
+enum { READINGS = 4096 };
+
+/* A running scan, from the device's readings to the written records. */
+struct scan {
+	const struct cli *cli;
+	tactus_device *device;
+	bool raw;
+	tactus_table *table;
+	tactus_converter *converter;
+	tactus_model *model;
+	tactus_estimator *estimator;
+	tactus_writer *writer;
+	double after_s; /* --append: added to times and sequence numbers */
+	uint64_t after_scans;
+	int *tare_channels; /* --tare: the mean estimate of each channel's first second */
+	double *tare_N;
+	size_t tare_count;
+	uint64_t first, last, scans; /* sequence numbers, and how many scans came */
+	bool progress;
+	double shown_s;
+};
+
+static double clock_s(void)
+{
+	struct timespec now;
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* ---- settings ------------------------------------------------------------------------------------------------------
+ */
+
+static unsigned modes(const char *text)
+{
+	return !strcmp(text, "dc")   ? TACTUS_MODE_DC
+		   : !strcmp(text, "ac") ? TACTUS_MODE_AC
+		   : *text               ? TACTUS_MODE_DC | TACTUS_MODE_AC
+								 : 0;
+}
+
+static tactus_scan_settings settings(const struct cli *cli, const int *channels, size_t channel_count)
+{
+	tactus_scan_settings s = tactus_scan_defaults();
+	s.channels = channels;
+	s.channel_count = channel_count;
+	s.modes = modes(cli_string(cli, "mode", ""));
+	s.drive_V = cli_quantity(cli, "drive", NAN);
+	s.frequency_Hz = cli_quantity(cli, "frequency", NAN);
+	s.rate_Hz = cli_quantity(cli, "rate", NAN);
+	s.settle_s = cli_quantity(cli, "settle", NAN);
+	s.count = cli_integer(cli, "count", 0);
+	s.duration_s = cli_quantity(cli, "duration", NAN);
+	s.protocol = cli_string(cli, "protocol", NULL);
+	s.loads = cli_string(cli, "loads", NULL);
+	s.seed = cli_integer(cli, "seed", 0);
+	s.realtime = cli_has(cli, "realtime");
+	return s;
+}
+
+/* `1`, `0.5%` → a share. */
+static int max_lost(const struct cli *cli, double *share)
+{
+	const char *text = cli_string(cli, "max-lost", "1");
+	double percent;
+	if (tactus_parse_quantity(text, "pct", &percent) < 0 || !(percent >= 0 && percent <= 100))
+		return cli_error(cli, CLI_USAGE, "--max-lost: '%s' is not a percentage from 0 to 100", text);
+	*share = percent / 100;
+	return 0;
+}
+
+/* ---- continuing a recording ----------------------------------------------------------------------------------------
+ */
+
+/* The end of the recording that is there: the next scan begins on the next tick of its rate. */
+static int find_end(struct scan *scan, tactus_reader *reader)
+{
+	double rate_Hz = 0, last_s = -1;
+	tactus_table *block = tactus_reader_block(reader);
+	long rows;
+	int error = tactus_metadata_get_number(tactus_table_metadata(block), "rate_Hz", &rate_Hz);
+	if (error < 0)
+		return error;
+	while ((rows = tactus_reader_next(reader, 0, &block)) > 0) {
+		const double *time = tactus_table_numbers(block, "time_s"), *sequence = tactus_table_numbers(block, "sequence");
+		last_s = time ? time[rows - 1] : last_s;
+		if (sequence && sequence[rows - 1] >= 0)
+			scan->after_scans = (uint64_t)sequence[rows - 1] + 1;
+	}
+	scan->after_s = !(last_s >= 0) ? 0 : rate_Hz > 0 ? (floor(last_s * rate_Hz) + 1) / rate_Hz : last_s;
+	return rows < 0 ? (int)rows : 0;
+}
+
+static int open_appended(struct scan *scan)
+{
+	const char *path = cli_string(scan->cli, "output-file", NULL);
+	tactus_reader *reader;
+	if (!cli_has(scan->cli, "append") || access(path, F_OK) != 0)
+		return 0;
+	int error = tactus_reader_open(path, NULL, &reader);
+	if (error)
+		return error;
+	error = find_end(scan, reader);
+	tactus_reader_close(reader);
+	return error;
+}
+
+static int open_writer(struct scan *scan)
+{
+	const struct cli *cli = scan->cli;
+	const bool json = cli_has(cli, "json") || !strcmp(cli_string(cli, "format", "csv"), "jsonl");
+	const unsigned flags = TACTUS_WRITE_IN_PLACE | (cli_has(cli, "overwrite") ? TACTUS_WRITE_OVERWRITE : 0u) |
+						   (cli_has(cli, "append") ? TACTUS_WRITE_APPEND : 0u);
+	const int error = open_appended(scan);
+	return error ? error
+				 : tactus_writer_open(cli_string(cli, "output-file", NULL),
+									  json ? TACTUS_FORMAT_JSON_LINES : TACTUS_FORMAT_CSV, flags, &scan->writer);
+}
+
+/* ---- from readings to records --------------------------------------------------------------------------------------
+ */
+
+/* The contract's order of the columns; what is not there yet is filled by the device, the converter, the estimator. */
+static int make_columns(struct scan *scan)
+{
+	static const char *const numbers[] = {"time_s",
+										  "sequence",
+										  "channel",
+										  "mode",
+										  "drive_V",
+										  "frequency_Hz",
+										  "amplitude_V",
+										  "phase_rad",
+										  "resistance_ohm",
+										  "conductance_S",
+										  "capacitance_F",
+										  "resistance_std_ohm",
+										  "conductance_std_S",
+										  "capacitance_std_F"};
+	const tactus_metadata *from = tactus_device_metadata(scan->device);
+	tactus_metadata *to = tactus_table_metadata(scan->table);
+	int error = tactus_table_resize(scan->table, 0);
+	for (size_t i = 0; i < tactus_metadata_count(from) && !error; i++)
+		error = tactus_metadata_set(to, tactus_metadata_key(from, i), tactus_metadata_value(from, i));
+	for (size_t i = 0; i < sizeof numbers / sizeof *numbers && !error && !scan->raw; i++) {
+		if (!strcmp(numbers[i], "mode"))
+			tactus_table_set_texts(scan->table, numbers[i]);
+		else
+			tactus_table_set_numbers(scan->table, numbers[i]);
+	}
+	return error ? error : tactus_device_table(scan->device, NULL, 0, scan->raw, scan->table);
+}
+
+/* What stands between the device and the records. */
+static int build(struct scan *scan)
+{
+	char fingerprint[17];
+	int error = make_columns(scan);
+	if (!error && !scan->raw)
+		error = tactus_converter_new(scan->table, NULL, &scan->converter);
+	if (error || !scan->model)
+		return error;
+	tactus_model_fingerprint(scan->model, fingerprint);
+	error = tactus_metadata_set(tactus_table_metadata(scan->table), "model", fingerprint);
+	return error ? error : tactus_estimator_new(scan->model, &scan->estimator);
+}
+
+static double *tare_of(const struct scan *scan, int channel)
+{
+	for (size_t i = 0; i < scan->tare_count; i++)
+		if (scan->tare_channels[i] == channel)
+			return &scan->tare_N[i];
+	return NULL;
+}
+
+/* Means of the first second's estimates, channel by channel; a channel without one is not tared. */
+static int find_tare(struct scan *scan, const tactus_reading *readings, size_t n)
+{
+	const double *force = tactus_table_numbers(scan->table, "force_estimate_N");
+	size_t *counts = calloc(n, sizeof *counts);
+	scan->tare_channels = calloc(n, sizeof *scan->tare_channels);
+	scan->tare_N = calloc(n, sizeof *scan->tare_N);
+	for (size_t i = 0; i < n && force && counts && scan->tare_channels && scan->tare_N; i++) {
+		double *tare = tare_of(scan, readings[i].channel);
+		if (isnan(force[i]))
+			continue;
+		if (!tare) {
+			tare = &scan->tare_N[scan->tare_count];
+			scan->tare_channels[scan->tare_count++] = readings[i].channel;
+		}
+		const size_t k = (size_t)(tare - scan->tare_N);
+		*tare += (force[i] - *tare) / (double)++counts[k];
+	}
+	const bool done = counts && scan->tare_channels && scan->tare_N;
+	free(counts);
+	return done ? 0 : TACTUS_ERR_MEMORY;
+}
+
+static int subtract_tare(struct scan *scan, const tactus_reading *readings, size_t n)
+{
+	const double *estimate = tactus_table_numbers(scan->table, "force_estimate_N");
+	double *values = malloc(n * sizeof *values);
+	if (!values || !estimate) {
+		free(values);
+		return values ? 0 : TACTUS_ERR_MEMORY;
+	}
+	for (size_t i = 0; i < n; i++) {
+		const double *tare = tare_of(scan, readings[i].channel);
+		values[i] = estimate[i] - (tare ? *tare : 0);
+	}
+	double *column = tactus_table_set_numbers(scan->table, "force_estimate_N");
+	if (column)
+		memcpy(column, values, n * sizeof *values);
+	free(values);
+	return column ? 0 : TACTUS_ERR_MEMORY;
+}
+
+static void count_scans(struct scan *scan, const tactus_reading *readings, size_t n)
+{
+	for (size_t i = 0; i < n; i++) {
+		if (!scan->scans)
+			scan->first = readings[i].sequence;
+		if (!scan->scans || readings[i].sequence != scan->last)
+			scan->scans++;
+		scan->last = readings[i].sequence;
+	}
+}
+
+/* Readings become records, and are written and flushed; `first_second`: of these the tare is taken. */
+static int put(struct scan *scan, tactus_reading *readings, size_t n, bool first_second)
+{
+	count_scans(scan, readings, n);
+	for (size_t i = 0; i < n && scan->after_scans; i++) {
+		readings[i].time_s += scan->after_s;
+		readings[i].sequence += scan->after_scans;
+	}
+	int error = tactus_device_table(scan->device, readings, n, scan->raw, scan->table);
+	if (!error && scan->converter)
+		error = tactus_converter_block(scan->converter, scan->table);
+	if (!error && scan->estimator)
+		error = tactus_estimator_block(scan->estimator, scan->table);
+	if (!error && first_second)
+		error = find_tare(scan, readings, n);
+	if (!error && scan->tare_count)
+		error = subtract_tare(scan, readings, n);
+	if (!error)
+		error = tactus_writer_rows(scan->writer, scan->table);
+	return error ? error : tactus_writer_flush(scan->writer);
+}
+
+/* ---- acquiring -----------------------------------------------------------------------------------------------------
+ */
+
+/* One line on a terminal, ten times a second at most, that overwrites itself. */
+static void show_progress(struct scan *scan, double since_s, bool end)
+{
+	const uint64_t expected = tactus_device_expected_scans(scan->device), done = scan->scans;
+	const double now_s = clock_s();
+	if (!scan->progress || (!end && now_s - scan->shown_s < 0.1))
+		return;
+	scan->shown_s = now_s;
+	if (end)
+		fputs("\r\033[K", stderr);
+	else if (expected && done) {
+		const double left_s = (now_s - since_s) * ((double)expected / (double)done - 1);
+		fprintf(stderr, "\r\033[Kscan %llu of %llu, %.0f %%, %d:%02d to go", (unsigned long long)done,
+				(unsigned long long)expected, 100 * (double)done / (double)expected, (int)left_s / 60,
+				(int)left_s % 60);
+	} else
+		fprintf(stderr, "\r\033[Kscan %llu", (unsigned long long)done);
+}
+
+/* --tare: the readings of the first second are held until it is over, since all of them are tared with their mean. */
+static int hold_first_second(struct scan *scan)
+{
+	size_t held = 0, capacity = 0;
+	tactus_reading *readings = NULL;
+	long n = 1;
+	while (!cli_signal && n > 0 && (held == 0 || readings[held - 1].time_s < readings[0].time_s + 1)) {
+		if (capacity - held < READINGS / 16) {
+			capacity = 2 * capacity + READINGS;
+			tactus_reading *grown = realloc(readings, capacity * sizeof *readings);
+			if (!grown) {
+				free(readings);
+				return TACTUS_ERR_MEMORY;
+			}
+			readings = grown;
+		}
+		/* a few at a time, so that not much more than a second is held at full speed */
+		n = tactus_device_read(scan->device, readings + held, READINGS / 16);
+		held += n > 0 ? (size_t)n : 0;
+	}
+	size_t second = 0;
+	while (second < held && readings[second].time_s < readings[0].time_s + 1)
+		second++;
+	int error = n < 0 && n != TACTUS_ERR_INTERRUPTED ? (int)n : 0;
+	if (!error && second)
+		error = put(scan, readings, second, true);
+	if (!error && held > second)
+		error = put(scan, readings + second, held - second, false);
+	free(readings);
+	return error;
+}
+
+static int acquire(struct scan *scan)
+{
+	tactus_reading *readings = malloc(READINGS * sizeof *readings);
+	const double since_s = clock_s();
+	int error = !readings ? TACTUS_ERR_MEMORY : cli_has(scan->cli, "tare") ? hold_first_second(scan) : 0;
+	while (!error && !cli_signal) {
+		const long n = tactus_device_read(scan->device, readings, READINGS);
+		if (n == 0)
+			break;
+		if (n == TACTUS_ERR_INTERRUPTED)
+			continue;
+		error = n < 0 ? (int)n : put(scan, readings, (size_t)n, false);
+		show_progress(scan, since_s, false);
+	}
+	show_progress(scan, since_s, true);
+	free(readings);
+	return error;
+}
+
+/* ---- the command ----------------------------------------------------------------------------------------------------
+ */
+
+/* More scans lost than are allowed is a failure, even though what came is kept. */
+static int check_lost(const struct scan *scan, double share)
+{
+	const uint64_t expected = tactus_device_expected_scans(scan->device);
+	const uint64_t taken = scan->scans ? scan->last - scan->first + 1 : cli_signal ? 0 : expected;
+	const uint64_t lost = taken - scan->scans;
+	if (!lost)
+		return CLI_OK;
+	const double percent = 100 * (double)lost / (double)taken;
+	if ((double)lost > share * (double)taken)
+		return cli_error(scan->cli, CLI_LOST, "%llu of %llu scans were lost (%.3g %%, --max-lost %.3g %%)",
+						 (unsigned long long)lost, (unsigned long long)taken, percent, 100 * share);
+	cli_note(scan->cli, "%llu of %llu scans were lost (%.3g %%)", (unsigned long long)lost, (unsigned long long)taken,
+			 percent);
+	return CLI_OK;
+}
+
+/* The header is written only now that the device has started. */
+static int run_started(struct scan *scan, double share)
+{
+	int error = build(scan);
+	if (!error)
+		error = open_writer(scan);
+	if (error)
+		return cli_fail(scan->cli, error);
+	error = tactus_writer_header(scan->writer, scan->table);
+	if (!error)
+		error = tactus_writer_flush(scan->writer);
+	if (!error)
+		error = acquire(scan);
+	int status = cli_fail(scan->cli, error);
+	const int stopped = tactus_device_stop(scan->device);
+	const int closed = tactus_writer_close(scan->writer);
+	if (!error)
+		status = cli_fail(scan->cli, closed ? closed : stopped);
+	if (!error && !closed && status == CLI_OK)
+		status = check_lost(scan, share);
+	return cli_signal ? 128 + (int)cli_signal : status;
+}
+
+static void free_scan(struct scan *scan)
+{
+	tactus_estimator_free(scan->estimator);
+	tactus_converter_free(scan->converter);
+	tactus_table_free(scan->table);
+	tactus_device_close(scan->device);
+	tactus_model_free(scan->model);
+	free(scan->tare_channels);
+	free(scan->tare_N);
+}
+
+static int check_usage(const struct cli *cli)
+{
+	const bool model = cli_has(cli, "model-file"), file = cli_has(cli, "output-file");
+	if (cli_has(cli, "tare") && !model)
+		return cli_error(cli, CLI_USAGE, "--tare needs a model (-m MODEL): it is the force that is tared");
+	if (cli_has(cli, "raw") && model)
+		return cli_error(cli, CLI_USAGE, "--raw and -m: detector volts have no force; convert them first");
+	if (cli_has(cli, "append") && !file)
+		return cli_error(cli, CLI_USAGE, "--append needs -o FILE");
+	if (cli_has(cli, "append") && cli_has(cli, "overwrite"))
+		return cli_error(cli, CLI_USAGE, "--append and --overwrite contradict each other");
+	return 0;
+}
+
+static int run(struct cli *cli)
+{
+	struct scan scan = {.cli = cli, .raw = cli_has(cli, "raw")};
+	int *channels = NULL;
+	size_t channel_count = 0;
+	double share = 0;
+	int status = check_usage(cli);
+	if (!status)
+		status = max_lost(cli, &share);
+	if (!status)
+		status = cli_channels(cli, "channels", &channels, &channel_count);
+	if (status)
+		return status;
+	cli_catch_signals();
+	scan.progress = !cli_quiet(cli) && isatty(STDERR_FILENO) && (!isatty(STDOUT_FILENO) || cli_has(cli, "output-file"));
+	scan.table = tactus_table_new();
+	const tactus_scan_settings asked = settings(cli, channels, channel_count);
+	int error = scan.table ? 0 : TACTUS_ERR_MEMORY;
+	if (!error && cli_has(cli, "model-file"))
+		error = tactus_model_read(cli_string(cli, "model-file", NULL), &scan.model);
+	if (!error)
+		error = tactus_device_open(cli_argument(cli, 0), &scan.device);
+	if (!error)
+		error = tactus_device_start(scan.device, &asked);
+	status = error ? cli_fail(cli, error) : run_started(&scan, share);
+	free_scan(&scan);
+	free(channels);
+	return status;
+}
+
+static const struct cli_option options[] = {
+	{"channels", 'c', CLI_STRING, "LIST", NULL, "channels in the order of the scan: 1-8, or 3,1,2"},
+	{"mode", 0, CLI_CHOICE, "MODES", "dc|ac|dc,ac", "DC, AC or both in turn on every channel"},
+	{"drive", 0, CLI_QUANTITY, "VOLTS", "V", "peak of the AC drive; the DC drive where the mode is dc"},
+	{"frequency", 0, CLI_QUANTITY, "HERTZ", "Hz", "frequency of the AC drive"},
+	{"rate", 0, CLI_QUANTITY, "HERTZ", "Hz", "scans per second"},
+	{"settle", 0, CLI_QUANTITY, "TIME", "s", "time to settle after every switch"},
+	{"count", 0, CLI_INTEGER, "SCANS", NULL, "stop after so many scans"},
+	{"duration", 0, CLI_QUANTITY, "TIME", "s", "stop after that time"},
+	{"protocol", 0, CLI_STRING, "TEXT", NULL, "the load to apply: 'rest 2s, sine 0.5Hz 1N..3N 60s' (simulated)"},
+	{"loads", 0, CLI_FILE, "standard|FILE", NULL, "known loads in place of the sensors (simulated)"},
+	{"seed", 0, CLI_INTEGER, "NUMBER", NULL, "other random numbers than the bench's (simulated)"},
+	{"realtime", 0, CLI_FLAG, NULL, NULL, "by the clock, not as fast as possible (simulated, replay)"},
+	{"raw", 0, CLI_FLAG, NULL, NULL, "the detectors' own volts, not converted"},
+	CLI_OPTION_MODEL_FILE,
+	{"tare", 0, CLI_FLAG, NULL, NULL, "subtract each channel's mean force of the first second"},
+	{"max-lost", 0, CLI_STRING, "PERCENT", NULL, "exit with 5 if more scans are lost (default 1%)"},
+	{"no-reconnect", 0, CLI_FLAG, NULL, NULL, "end at once when the device is lost"},
+	{"reconnect-timeout", 0, CLI_QUANTITY, "TIME", "s", "wait so long for a lost device"},
+	{"append", 0, CLI_FLAG, NULL, NULL, "continue FILE: its columns, its time, its scan numbers"},
+	CLI_OPTIONS_OUTPUT,
+	CLI_OPTIONS_FORMAT,
+	{NULL, 0, CLI_FLAG, NULL, NULL, NULL},
+};
+
+const struct cli_command cli_scan = {
+	.name = "scan",
+	.summary = "acquire readings from a device, channel by channel through its switches",
+	.arguments = "URI",
+	.description =
+		"Opens the device, starts a scan and prints one record per reading: time_s from the start of the scan (the "
+		"middle "
+		"of the converter's window), sequence (the number of the scan, shared by its readings; a lost scan is a gap), "
+		"channel, mode, drive, frequency, amplitude and phase, resistance, conductance and capacitance with their "
+		"standard "
+		"uncertainties, quality, and the reference force and temperature where the bench has them. With --raw the "
+		"detectors' volts stand in place of all that is computed from them. Records are flushed as they come. The "
+		"first "
+		"Ctrl-C stops cleanly and keeps what came, the second aborts.\n\n"
+		"What is not given is the bench's: its channels, modes, rate, settle time, drive and frequency. A scan ends "
+		"after "
+		"--count scans, after --duration, or with --protocol, whichever comes first; without any of these it lasts as "
+		"long as the bench's own protocol, whose last load stays on when a count or a duration asks for more. With "
+		"--loads "
+		"it ends when every known load has met every frequency and drive.\n\n"
+		"A protocol is a list of steps, separated by commas: rest TIME; hold FORCE TIME; ramp FROM..TO TIME (or ramp "
+		"TO "
+		"TIME, from the load before); staircase FROM..TO STEP TIME (or FROM..TO..FROM), the time being that of one "
+		"level; "
+		"triangle, sine and cycle FREQUENCY FROM..TO TIME, where triangle and cycle begin at FROM and sine in the "
+		"middle; "
+		"random FROM..TO TIME TIME, levels drawn from the seed, each held for the first time; tap PEAK WIDTH, half a "
+		"sine; "
+		"repeat COUNT (steps). Times are in s, ms, min or h, forces in N, mN or kN.\n\n"
+		"sim:FILE.toml is a bench of your own. Its file says base = \"paredes\" or \"lebosse\" and what differs, and "
+		"adds "
+		"effects of the catalogue (tactus show --effects lists them), which the recording does not name. The same seed "
+		"gives "
+		"the same bytes; the start that a simulated recording states is the bench's, unless --realtime. replay:FILE "
+		"plays a "
+		"recording, raw or converted; --channels, --mode, --count and --duration choose from it.\n\n"
+		"With -m the force is estimated live. --tare holds back the first second, then subtracts from every estimate "
+		"the "
+		"mean of its channel in that second. A simulated or played device is never lost; --no-reconnect and "
+		"--reconnect-timeout are for those that can be.",
+	.examples =
+		"tactus scan sim: -o run.csv                                       # eight simulated sensors, 0 to 250 N\n"
+		"tactus scan sim: --channels 3,1 --mode ac --count 100             # two channels, AC, a hundred scans\n"
+		"tactus scan sim:lebosse --protocol 'cycle 0.25Hz 1.3N..4.4N 20min' # the load cycles\n"
+		"tactus scan sim: --loads standard -o loads.csv                    # known R and C in place of the sensors\n"
+		"tactus scan replay:run.csv --realtime | tactus force -m model.toml # as if it were live\n",
+	.options = options,
+	.arguments_min = 1,
+	.arguments_max = 1,
+	.run = run,
+};
