@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include <tactus/tactus.h>
 
@@ -110,6 +111,12 @@ int cli_error(const struct cli *cli, int status, const char *format, ...) TACTUS
 /* A note on standard error, silent with --quiet; cli_debug only with --verbose. */
 void cli_note(const struct cli *cli, const char *format, ...) TACTUS_PRINTF(2, 3);
 void cli_debug(const struct cli *cli, const char *format, ...) TACTUS_PRINTF(2, 3);
+
+/*
+ * Prints the words of text, from the present `column` on, in lines of at most 80 columns that go on at `indent`, up to
+ * the end of the paragraph (a blank line); returns what follows it.
+ */
+const char *cli_wrap(FILE *out, const char *text, size_t column, size_t indent);
 
 /*
  * First SIGINT or SIGTERM sets cli_signal (a clean stop, exit 128+n), the second ends the program at once. Installed

@@ -1,4 +1,5 @@
 /* --help: made from the option tables, no line longer than 80 columns. */
+#include <ctype.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -15,8 +16,7 @@ static size_t columns_of(const char *text, size_t length)
 	return columns;
 }
 
-/* Prints words from `column` on, going on at `indent`, up to the end of the paragraph; returns what follows it. */
-static const char *wrap(FILE *out, const char *text, size_t column, size_t indent)
+const char *cli_wrap(FILE *out, const char *text, size_t column, size_t indent)
 {
 	bool first = true;
 	while (*text && strncmp(text, "\n\n", 2) != 0) {
@@ -55,27 +55,21 @@ static void print_option(FILE *out, const struct cli_option *option)
 		option->letter ? snprintf(left, sizeof left, "  -%c, ", option->letter) : snprintf(left, sizeof left, "      ");
 	n += snprintf(left + n, sizeof left - (size_t)n, "--%s%s%s", option->name, argument ? " " : "",
 				  argument ? argument : "");
-	if (n > TEXT_COLUMN - 2)
+	if (n > TEXT_COLUMN - 1)
 		fprintf(out, "%s\n%*s", left, TEXT_COLUMN, "");
 	else
 		fprintf(out, "%-*s", TEXT_COLUMN, left);
 	char text[256];
 	bool choices = option->kind == CLI_CHOICE && argument != option->unit;
 	snprintf(text, sizeof text, "%s%s%s", option->help, choices ? ": " : "", choices ? option->unit : "");
-	wrap(out, text, TEXT_COLUMN, TEXT_COLUMN);
-}
-
-void cli_usage(FILE *out, const struct cli_command *command)
-{
-	fprintf(out, "Usage: tactus %s [OPTION]...%s%s\n", command->name, *command->arguments ? " " : "",
-			command->arguments);
+	cli_wrap(out, text, TEXT_COLUMN, TEXT_COLUMN);
 }
 
 static void paragraphs(FILE *out, const char *text)
 {
 	while (text && *text) {
 		fputc('\n', out);
-		text = wrap(out, text, 0, 0);
+		text = cli_wrap(out, text, 0, 0);
 	}
 }
 
@@ -95,8 +89,9 @@ static void print_example(FILE *out, const char *line, size_t length)
 
 void cli_help_command(FILE *out, const struct cli_command *command, bool full)
 {
-	cli_usage(out, command);
-	wrap(out, command->summary, 0, 0);
+	fprintf(out, "Usage: tactus %s [OPTION]...%s%s\n%c", command->name, *command->arguments ? " " : "",
+			command->arguments, toupper((unsigned char)command->summary[0]));
+	cli_wrap(out, command->summary + 1, 1, 0);
 	if (full)
 		paragraphs(out, command->description);
 	heading(out, "Options");
@@ -125,14 +120,14 @@ void cli_help_program(FILE *out)
 	heading(out, "Commands");
 	for (const struct cli_command *const *c = cli_commands; *c; c++) {
 		fprintf(out, "  %-10s ", (*c)->name);
-		wrap(out, (*c)->summary, 13, 13);
+		cli_wrap(out, (*c)->summary, 13, 13);
 	}
 	heading(out, "Options");
 	fputs("  --help, --version; tactus COMMAND --help and tactus help COMMAND say more\n", out);
 	heading(out, "Exit status");
 	for (const struct cli_status *s = cli_statuses; s->status; s++) {
 		fprintf(out, "  %-5s ", s->status);
-		wrap(out, s->meaning, 8, 8);
+		cli_wrap(out, s->meaning, 8, 8);
 	}
 	heading(out, "First steps");
 	fputs("  tactus scan sim: --count 5        # five scans of a simulated bench\n"

@@ -53,7 +53,6 @@ extern const struct cli_status cli_statuses[];
 void cli_help_program(FILE *out);
 /* The screen that --help prints; full adds the description. */
 void cli_help_command(FILE *out, const struct cli_command *command, bool full);
-void cli_usage(FILE *out, const struct cli_command *command);
 /* How an option's argument is written in help: its choices where they are short, else its name. */
 const char *cli_option_argument(const struct cli_option *option);
 

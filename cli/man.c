@@ -132,6 +132,16 @@ void cli_man_command(FILE *out, const struct cli_command *command)
 	fputs(".Sh SEE ALSO\n.Xr tactus 1\n", out);
 }
 
+/* The command after `last` in the alphabet, as SEE ALSO lists them; NULL past the end. */
+static const struct cli_command *following(const struct cli_command *last)
+{
+	const struct cli_command *next = NULL;
+	for (const struct cli_command *const *c = cli_commands; *c; c++)
+		if ((!last || strcmp((*c)->name, last->name) > 0) && (!next || strcmp((*c)->name, next->name) < 0))
+			next = *c;
+	return next;
+}
+
 void cli_man_program(FILE *out)
 {
 	title(out, "tactus", "trustworthy readings from low-cost force sensors");
@@ -153,6 +163,10 @@ void cli_man_program(FILE *out)
 		  out);
 	exit_statuses(out);
 	fputs(".Sh SEE ALSO\n", out);
-	for (const struct cli_command *const *c = cli_commands; *c; c++)
-		fprintf(out, ".Xr tactus-%s 1%s\n", (*c)->name, c[1] ? " ," : "");
+	const struct cli_command *last = NULL, *next;
+	while ((next = following(last))) {
+		fprintf(out, "%s.Xr tactus-%s 1", last ? " ,\n" : "", next->name);
+		last = next;
+	}
+	fputc('\n', out);
 }

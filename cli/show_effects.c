@@ -7,8 +7,10 @@
 
 static void text_line(const char *label, const char *text)
 {
-	if (*text)
-		printf("  %-14s %s\n", label, text);
+	if (!*text)
+		return;
+	printf("  %-14s ", label);
+	cli_wrap(stdout, text, 17, 17);
 }
 
 static void print_bound(double bound)
@@ -22,21 +24,24 @@ static void print_bound(double bound)
 
 static void print_effect(const tactus_effect *effect, const tactus_domain *domain)
 {
-	printf("%s (%s, stage %s): %s\n", tactus_effect_name(effect), tactus_domain_name(domain),
-		   tactus_effect_stage(effect), tactus_effect_summary(effect));
+	printf("%s: domain %s, stage %s\n", tactus_effect_name(effect), tactus_domain_name(domain),
+		   tactus_effect_stage(effect));
+	text_line("does", tactus_effect_summary(effect));
 	text_line("source", tactus_effect_source(effect));
 	text_line("mark on", tactus_effect_covariate(effect));
 	text_line("needs", tactus_effect_needs(effect));
 	text_line("confused with", tactus_effect_confused_with(effect));
 	for (size_t i = 0; i < tactus_effect_parameters(effect); i++) {
 		tactus_parameter_info p = tactus_effect_parameter(effect, i);
-		printf("  %s%s%s%s: %s; ", p.name, *p.unit ? " [" : "", p.unit, *p.unit ? "]" : "", p.summary);
+		bool ratio = !*p.unit || !strcmp(p.unit, "1");
+		printf("  %s%s%s: ", p.name, ratio ? "" : " in ", ratio ? "" : p.unit);
 		print_bound(p.lower);
 		fputs(" to ", stdout);
 		print_bound(p.upper);
 		fputs(", neutral ", stdout);
 		print_bound(p.neutral);
-		fputc('\n', stdout);
+		fputs("\n    ", stdout);
+		cli_wrap(stdout, p.summary, 4, 4);
 	}
 }
 
@@ -101,8 +106,8 @@ static void visit_line(void *context, const tactus_effect *effect, const tactus_
 	if (*last != domain)
 		printf("%s%s:\n", *last ? "\n" : "", tactus_domain_name(domain));
 	*last = domain;
-	printf("  %-23s %-12s %s\n", tactus_effect_name(effect), tactus_effect_stage(effect),
-		   tactus_effect_summary(effect));
+	printf("  %-23s %-12s ", tactus_effect_name(effect), tactus_effect_stage(effect));
+	cli_wrap(stdout, tactus_effect_summary(effect), 39, 39);
 }
 
 static void visit_nothing(void *context, const tactus_effect *effect, const tactus_domain *domain)
