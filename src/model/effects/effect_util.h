@@ -71,20 +71,20 @@ static inline const char *tactus_want_order(const tactus_series *series)
 
 static inline const char *tactus_want_force_range(const tactus_series *series)
 {
-	return tactus_series_distinct(series, SENSOR_FORCE, 3) < 3 ? "force_N has fewer than three values" : NULL;
+	return tactus_series_distinct(series, SENSOR_FORCE, 3) < 3 ? "the load has fewer than three values" : NULL;
 }
 
 /* The load goes up and comes down again. */
 static inline const char *tactus_want_reversal(const tactus_series *series)
 {
-	return tactus_series_reversals(series, SENSOR_FORCE) < 1 ? "force_N never turns: it only rises or only falls"
+	return tactus_series_reversals(series, SENSOR_FORCE) < 1 ? "the load never turns: it only rises or only falls"
 															 : NULL;
 }
 
 /* The load goes up and down more than once. */
 static inline const char *tactus_want_cycles(const tactus_series *series)
 {
-	return tactus_series_reversals(series, SENSOR_FORCE) < 3 ? "force_N does not cycle" : NULL;
+	return tactus_series_reversals(series, SENSOR_FORCE) < 3 ? "the load does not cycle" : NULL;
 }
 
 static inline const char *tactus_want_ac(const tactus_series *series)

@@ -54,7 +54,7 @@ static const char *testable(const tactus_series *series)
 		return why;
 	if (!(tactus_series_duration_s(series) >= 2))
 		return "shorter than two seconds";
-	return tactus_want_reversal(series) ? "no load followed by recovery: force_N only rises or only falls" : NULL;
+	return tactus_want_reversal(series) ? "no load followed by recovery: it only rises or only falls" : NULL;
 }
 
 const struct tactus_effect tactus_effect_sensor_creep = {

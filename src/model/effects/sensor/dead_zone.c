@@ -34,7 +34,7 @@ static const char *testable(const tactus_series *series)
 {
 	double least, most;
 	if (!tactus_magnitudes(series, SENSOR_FORCE, SENSOR_FORCE, &least, &most) || least > 0.2 * most)
-		return "no low forces: force_N never falls below a fifth of its largest value";
+		return "no low forces: the load never falls below a fifth of its largest value";
 	return tactus_want_force_range(series);
 }
 

@@ -92,7 +92,7 @@ static const char *testable(const tactus_series *series)
 	const char *why = tactus_want_clock(series);
 	if (why)
 		return why;
-	return tactus_series_distinct(series, SENSOR_FORCE, 2) < 2 ? "force_N never changes" : NULL;
+	return tactus_series_distinct(series, SENSOR_FORCE, 2) < 2 ? "the load never changes" : NULL;
 }
 
 const struct tactus_effect tactus_effect_sensor_time_offset = {
