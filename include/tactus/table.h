@@ -87,9 +87,13 @@ typedef struct tactus_reader tactus_reader;
 
 /** How a file that is not ours is read (CONTRACT: foreign files). All zero means: ours. */
 typedef struct {
-	char delimiter;      /**< 0: comma, or semicolon or tab if the header has those and no comma */
-	bool decimal_comma;  /**< 12,5 is twelve and a half; the delimiter then defaults to ';' */
-	const char *columns; /**< "new=old,time_s=ms/1000,force_N=load*9.81": renames and scales; NULL or "": none */
+	char delimiter;     /**< 0: comma, or semicolon or tab if the header has those and no comma */
+	bool decimal_comma; /**< 12,5 is twelve and a half; the delimiter then defaults to ';' */
+	/**
+	 * "new=old,time_s=ms/1000,force_N=load*9.81" renames and scales; "conductance_S@1=A0,conductance_S@2=A1" makes
+	 * one row per channel of every line of a wide file. NULL or "": none. Recorded in the metadata as `columns`.
+	 */
+	const char *columns;
 } tactus_read_options;
 
 /**
@@ -101,7 +105,8 @@ TACTUS_API int tactus_reader_open(const char *path, const tactus_read_options *o
 TACTUS_API void tactus_reader_close(tactus_reader *reader);
 /**
  * The next rows, at least one and at most max_rows (0: a block of a suitable size); waits for the first and returns
- * early rather than wait for more. Returns the number of rows, 0 at the end, or TACTUS_ERR_INPUT with FILE:LINE.
+ * early rather than wait for more. Returns the number of rows, 0 at the end, TACTUS_ERR_INPUT with FILE:LINE (the rows
+ * before are delivered first), or TACTUS_ERR_INTERRUPTED if a signal was caught while waiting: call again or stop.
  * *block is owned by the reader, may be changed by the caller, and is valid until the next call.
  */
 TACTUS_API long tactus_reader_next(tactus_reader *reader, size_t max_rows, tactus_table **block);

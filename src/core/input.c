@@ -80,10 +80,19 @@ static int make_room(struct tactus_input *input)
 	return TACTUS_OK;
 }
 
-static bool readable(const struct tactus_input *input, int timeout_ms)
+static bool readable(const struct tactus_input *input)
 {
 	struct pollfd poller = {.fd = input->fd, .events = POLLIN};
-	return poll(&poller, 1, timeout_ms) > 0;
+	return poll(&poller, 1, 0) > 0;
+}
+
+/* Waits in poll(2), which a signal always ends, whatever its handler's flags: the caller may want to stop. */
+static int wait_for_bytes(const struct tactus_input *input)
+{
+	struct pollfd poller = {.fd = input->fd, .events = POLLIN};
+	if (poll(&poller, 1, -1) < 0)
+		return tactus_fail(TACTUS_ERR_INTERRUPTED, "%s: a signal came while waiting for input", input->name);
+	return TACTUS_OK;
 }
 
 /* One read(2) behind end, where there is room. 1 if a line is complete now, 0 if not, or TACTUS_ERR_INPUT. */
@@ -117,9 +126,9 @@ int tactus_input_fill(struct tactus_input *input)
 	while (input->complete <= input->begin && !input->at_end && found == 0) {
 		found = make_room(input);
 		if (found == TACTUS_OK)
+			found = wait_for_bytes(input);
+		if (found == TACTUS_OK)
 			found = read_more(input);
-		if (found == 0 && !input->at_end)
-			readable(input, -1);
 	}
 	return found < 0 ? found : input->complete > input->begin;
 }
@@ -127,7 +136,7 @@ int tactus_input_fill(struct tactus_input *input)
 bool tactus_input_ready(struct tactus_input *input)
 {
 	while (input->complete <= input->begin && !input->at_end) {
-		if (!readable(input, 0))
+		if (!readable(input))
 			return false;
 		if (input->end == input->size || read_more(input) < 0)
 			return true;

@@ -23,7 +23,10 @@ struct tactus_input {
 
 int tactus_input_open(const char *path, struct tactus_input *input);
 void tactus_input_close(struct tactus_input *input);
-/* Waits for a whole line: 1 if there is one at begin, 0 at the end, or TACTUS_ERR_INPUT. Moves the buffer. */
+/*
+ * Waits for a whole line: 1 if there is one at begin, 0 at the end, TACTUS_ERR_INPUT, or TACTUS_ERR_INTERRUPTED if a
+ * signal was caught meanwhile. Moves the buffer.
+ */
 int tactus_input_fill(struct tactus_input *input);
 /* True if tactus_input_fill() would not wait. Reads what is there, but moves nothing. */
 bool tactus_input_ready(struct tactus_input *input);
