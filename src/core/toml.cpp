@@ -296,7 +296,7 @@ int tactus_toml_item_string(const tactus_toml_node *array, size_t i, const char 
 	return 1;
 }
 
-int tactus_toml_fail(const tactus_toml_node *node, const char *key, int code, const char *format, ...)
+int(tactus_toml_fail)(const tactus_toml_node *node, const char *key, int code, const char *format, ...)
 {
 	char text[1024];
 	va_list arguments;
