@@ -15,7 +15,7 @@
 #include "device/sim.h"
 
 enum { BLOCK_SCANS = 64, BLOCK_FIELDS = 11 };
-static const double tick_s = 1e-6; /* of the bench's scan timer */
+static const double ticks_per_s = 1e6; /* of the bench's timer, which starts scans and stamps readings */
 
 typedef struct {
 	tactus_bench *bench;
@@ -128,7 +128,7 @@ static int choose_rate(tactus_sim *sim, const tactus_scan_settings *settings)
 	sim->settle_s = isnan(settings->settle_s) ? sim->bench->scan.settle_s : settings->settle_s;
 	if (!(rate_Hz > 0) || !(sim->settle_s >= 0))
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "the rate must be above zero and the settle time not negative");
-	sim->period_s = fmax(1, round(1 / rate_Hz / tick_s)) * tick_s;
+	sim->period_s = fmax(1, round(ticks_per_s / rate_Hz)) / ticks_per_s;
 	double longest_s = scan_time_s(sim, sim->frequency_Hz);
 	for (size_t i = 0; sim->loads != NULL && i < sim->loads->frequency_count; i++)
 		longest_s = fmax(longest_s, scan_time_s(sim, sim->loads->frequencies_Hz[i]));
@@ -400,7 +400,7 @@ static void plan_scan(tactus_sim *sim, uint64_t scan, size_t *next)
 			const size_t k = (*next)++;
 			const bool dc = modes[m] == TACTUS_MODE_DC;
 			const double window_s = sim_window_s(sim->bench, dc ? 0 : frequency_Hz);
-			const double at_s = time_s + sim->settle_s + window_s / 2;
+			const double at_s = round((time_s + sim->settle_s + window_s / 2) * ticks_per_s) / ticks_per_s;
 			tactus_reading *reading = &block->readings[k];
 			*reading = (tactus_reading){at_s,
 										scan,

@@ -9,7 +9,7 @@ static const double two_pi = 6.283185307179586;
 
 double sim_round(double value, double resolution)
 {
-	return resolution > 0 ? round(value / resolution) * resolution : value;
+	return resolution > 0 ? round(value / resolution) * resolution + 0.0 : value; /* no negative zero */
 }
 
 double sim_temperature_degC(const tactus_bench *bench, double time_s)

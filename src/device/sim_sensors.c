@@ -72,7 +72,10 @@ static double wander(uint64_t seed, uint64_t stream, double travel)
 	return ((1 - part) * a + part * b) / sqrt((1 - part) * (1 - part) + part * part);
 }
 
-/* What does not repeat: the wandering contact and its jumps. A film conducts and stores at least nothing. */
+/*
+ * What does not repeat: the wandering contact, all of it from one correlation length of load on and none without load,
+ * and its jumps. A film conducts and stores at least nothing.
+ */
 static void disturb(sim_sensor *sensor, double load_N, double *conductance_S, double *capacitance_F)
 {
 	const tactus_bench_sensor *what = sensor->sensor;
@@ -80,11 +83,12 @@ static void disturb(sim_sensor *sensor, double load_N, double *conductance_S, do
 		sensor->travel_N += fabs(load_N - sensor->last_load_N);
 	sensor->last_load_N = load_N;
 	if (what->repeatability_S > 0 || what->repeatability_F > 0) {
-		const double rho = what->repeatability_correlation, travel = sensor->travel_N / what->repeatability_length_N;
+		const double rho = what->repeatability_correlation, length_N = what->repeatability_length_N;
+		const double travel = sensor->travel_N / length_N, touch = fmin(1, fabs(load_N) / length_N);
 		const double a = wander(sensor->seed, STREAM_CONDUCTANCE, travel);
 		const double b = wander(sensor->seed, STREAM_CAPACITANCE, travel);
-		*conductance_S += what->repeatability_S * a;
-		*capacitance_F += what->repeatability_F * (rho * a + sqrt(1 - rho * rho) * b);
+		*conductance_S += what->repeatability_S * touch * a;
+		*capacitance_F += what->repeatability_F * touch * (rho * a + sqrt(1 - rho * rho) * b);
 	}
 	for (size_t i = 0; i < sensor->jump_count; i++)
 		if (load_N >= sensor->jumps[i].load_N) {
