@@ -265,6 +265,19 @@ static void time_offset_by_whole_samples_is_exact(void **unused)
 	}
 }
 
+/* Two recordings one after the other: the second does not look back into the first. */
+static void a_clock_that_steps_back_starts_a_new_history(void **unused)
+{
+	(void)unused;
+	double p[TACTUS_PARAMETERS_MAX], t[] = {0, 1, 2, 3, 0, 1, 2}, force[] = {1, 2, 3, 4, 15, 16, 17};
+	const double expected[] = {1, 1.5, 2.5, 3.5, 15, 15.5, 16.5};
+	rig_neutral(offset, p);
+	rig_set(offset, p, "offset_s", 0.5);
+	rig_load(offset, p, 7, t, force);
+	for (size_t i = 0; i < 7; i++)
+		rig_near(force[i], expected[i], 1e-15);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -279,6 +292,7 @@ int main(void)
 		cmocka_unit_test(creep_starts_settled_or_as_stated),
 		cmocka_unit_test(time_offset_is_the_delayed_sine),
 		cmocka_unit_test(time_offset_by_whole_samples_is_exact),
+		cmocka_unit_test(a_clock_that_steps_back_starts_a_new_history),
 	};
 	return cmocka_run_group_tests_name("effects: memory", tests, NULL, NULL);
 }

@@ -18,21 +18,21 @@ enum {
 	CYCLES_PARAMETERS
 };
 
+/* clang-format off */
 #define CYCLES_PARAMETER_ROWS                                                                                          \
 	{"recovery_per_s", "1/s", "rate at which the loss recovers while the load does not cycle", 0, 0, 10, 1e-3, 1e-3,   \
-	 TACTUS_SHAPE,     -1},                                                                                            \
-		{"reversal_N",    "N", "a reversal by more than this confirms a peak or a valley", 0.1, 1e-9, 1e9, 0.05, 0.02, \
-		 TACTUS_CONSTANT, -1},                                                                                         \
-		{"pause_s",       "s", "cycling has ended when no peak or valley came for so long", 30, 1e-3, 1e6, 30, 10,     \
-		 TACTUS_CONSTANT, -1},                                                                                         \
-		{"valley_relaxation_s", "s", "time constant with which a higher valley is accepted", 10, 1e-3, 1e6, 10, 5,     \
-		 TACTUS_CONSTANT,       -1},                                                                                   \
-		{"initial_loss", "1", "share of the sensitivity that is lost at the first sample", 0, 0, 0.99, 0.3, 0.1,       \
-		 TACTUS_INITIAL, -1},                                                                                          \
-	{                                                                                                                  \
-		"initial_depth_N", "N", "how far the last valley lies below the first sample's load", 0, 0, 1e9, 0.5, 0.2,     \
-			TACTUS_INITIAL, -1                                                                                         \
-	}
+	 TACTUS_SHAPE, -1},                                                                                                \
+	{"reversal_N", "N", "a reversal by more than this confirms a peak or a valley", 0.1, 1e-9, 1e9, 0.05, 0.02,        \
+	 TACTUS_CONSTANT, -1},                                                                                             \
+	{"pause_s", "s", "cycling has ended when no peak or valley came for so long", 30, 1e-3, 1e6, 30, 10,               \
+	 TACTUS_CONSTANT, -1},                                                                                             \
+	{"valley_relaxation_s", "s", "time constant with which a higher valley is accepted", 10, 1e-3, 1e6, 10, 5,         \
+	 TACTUS_CONSTANT, -1},                                                                                             \
+	{"initial_loss", "1", "share of the sensitivity that is lost at the first sample", 0, 0, 0.99, 0.3, 0.1,           \
+	 TACTUS_INITIAL, -1},                                                                                              \
+	{"initial_depth_N", "N", "how far the last valley lies below the first sample's load", 0, 0, 1e9, 0.5, 0.2,        \
+	 TACTUS_INITIAL, -1}
+/* clang-format on */
 
 /* The state of an effect is this many doubles. */
 enum {

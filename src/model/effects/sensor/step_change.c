@@ -4,34 +4,18 @@
 enum { STEPS = 4 };
 enum { TIME, OFFSET_G, OFFSET_C, GAIN_G, GAIN_C, PER_STEP };
 
+/* clang-format off */
 #define STEP(k)                                                                                                        \
 	{"time_" k "_s", "s", "instant of step " k, 0, -1e9, 1e9, 1, 1, TACTUS_SHAPE, -1},                                 \
-		{"conductance_offset_" k "_S",                                                                                 \
-		 "output0",                                                                                                    \
-		 "step " k " of the conductance's offset",                                                                     \
-		 0,                                                                                                            \
-		 -1e9,                                                                                                         \
-		 1e9,                                                                                                          \
-		 0.05,                                                                                                         \
-		 0.02,                                                                                                         \
-		 TACTUS_STRENGTH,                                                                                              \
-		 0},                                                                                                           \
-		{"capacitance_offset_" k "_F",                                                                                 \
-		 "output1",                                                                                                    \
-		 "step " k " of the capacitance's offset",                                                                     \
-		 0,                                                                                                            \
-		 -1e9,                                                                                                         \
-		 1e9,                                                                                                          \
-		 0.05,                                                                                                         \
-		 0.02,                                                                                                         \
-		 TACTUS_STRENGTH,                                                                                              \
-		 1},                                                                                                           \
-		{"conductance_gain_" k, "1", "step " k " of the conductance's sensitivity", 0, -1, 10, 0.05, 0.02,             \
-		 TACTUS_STRENGTH,       0},                                                                                    \
-	{                                                                                                                  \
-		"capacitance_gain_" k, "1", "step " k " of the capacitance's sensitivity", 0, -1, 10, 0.05, 0.02,              \
-			TACTUS_STRENGTH, 1                                                                                         \
-	}
+	{"conductance_offset_" k "_S", "output0", "step " k " of the conductance's offset", 0, -1e9, 1e9, 0.05, 0.02,      \
+	 TACTUS_STRENGTH, 0},                                                                                              \
+	{"capacitance_offset_" k "_F", "output1", "step " k " of the capacitance's offset", 0, -1e9, 1e9, 0.05, 0.02,      \
+	 TACTUS_STRENGTH, 1},                                                                                              \
+	{"conductance_gain_" k, "1", "step " k " of the conductance's sensitivity", 0, -1, 10, 0.05, 0.02,                 \
+	 TACTUS_STRENGTH, 0},                                                                                              \
+	{"capacitance_gain_" k, "1", "step " k " of the capacitance's sensitivity", 0, -1, 10, 0.05, 0.02,                 \
+	 TACTUS_STRENGTH, 1}
+/* clang-format on */
 
 static const tactus_parameter parameters[] = {STEP("1"), STEP("2"), STEP("3"), STEP("4")};
 

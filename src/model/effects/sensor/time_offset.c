@@ -15,9 +15,12 @@ static void reset(const double *p, double *state)
 	state[COUNT] = state[NEXT] = 0;
 }
 
+/* A clock that steps back starts a new history. */
 static void remember(double *state, double time_s, double force)
 {
 	size_t next = (size_t)state[NEXT];
+	if (state[COUNT] > 0 && time_s < state[TIMES + (next + RING - 1) % RING])
+		state[COUNT] = 0;
 	state[TIMES + next] = time_s;
 	state[FORCES + next] = force;
 	state[NEXT] = (double)((next + 1) % RING);
@@ -43,7 +46,7 @@ static double recall(const double *state, double t)
 			low = age + 1;
 	}
 	size_t before = (next + RING - 1 - low) % RING, after = (before + 1) % RING;
-	if (low == 0 || t <= state[TIMES + before])
+	if (t <= state[TIMES + before])
 		return state[FORCES + before];
 	return interpolate(t, state[TIMES + before], state[FORCES + before], state[TIMES + after], state[FORCES + after]);
 }
