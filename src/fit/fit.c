@@ -121,7 +121,7 @@ static int make_plan(const tactus_fit_options *options, const tactus_series *ser
 	int status = TACTUS_OK;
 	if (options->start) {
 		status = plan_of_start(plan, domain, options->start);
-	} else if (domain == &tactus_domain_sensor) {
+	} else if (domain == &tactus_domain_sensor && strcmp(k->name, "forward") != 0) {
 		plan->outputs[0] = k->conductance;
 		plan->outputs[1] = k->capacitance;
 		status = add_effects(plan, domain, k->effects);
@@ -159,7 +159,7 @@ static bool wanted(const tactus_plan *plan, const tactus_points *points, size_t 
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
 		if (!plan->outputs[o])
 			continue;
-		bool there = isfinite(points->reading[o][p]);
+		bool there = points->reading[o] && isfinite(points->reading[o][p]);
 		any = any || there;
 		all = all && there;
 	}
@@ -178,8 +178,8 @@ static moments moments_of(const double *x, const bool *use, size_t n)
 		if (!use[i] || isnan(x[i]))
 			continue;
 		m.n++;
-		m.low = fmin(m.low, x[i]);
-		m.high = fmax(m.high, x[i]);
+		m.low = x[i] < m.low ? x[i] : m.low;
+		m.high = x[i] > m.high ? x[i] : m.high;
 		double from = x[i] - m.mean;
 		m.mean += from / (double)m.n;
 		m.square += from * (x[i] - m.mean);
@@ -286,7 +286,7 @@ static int work_new(tactus_work *work, const tactus_plan *plan, int folds)
 	for (size_t c = 0; c < work->count; c++) {
 		tactus_points *points = &work->points[c];
 		int status = tactus_points_new(&work->series[c], work->recording, points);
-		if (status == TACTUS_OK)
+		if (status == TACTUS_OK && !work->parameters_only)
 			status = tactus_folds_new(points->input, points->n, folds, &work->folds[c]);
 		work->use[c] = status == TACTUS_OK ? calloc(points->n + 1, sizeof(bool)) : NULL;
 		if (!work->use[c])
@@ -294,7 +294,7 @@ static int work_new(tactus_work *work, const tactus_plan *plan, int folds)
 		for (size_t p = 0; p < points->n; p++)
 			work->use[c][p] = wanted(plan, points, p);
 		work->problem[c] = channel_problem(plan, &work->series[c], points, work->use[c]);
-		if (!work->parameters_only && work->folds[c].count > work->fold_count)
+		if (work->folds[c].count > work->fold_count)
 			work->fold_count = work->folds[c].count;
 	}
 	return TACTUS_OK;
@@ -303,11 +303,6 @@ static int work_new(tactus_work *work, const tactus_plan *plan, int folds)
 /* ---- the result ----------------------------------------------------------------------------------------------------
  */
 
-static double root(double square)
-{
-	return sqrt(square);
-}
-
 static void score_outputs(const tactus_plan *plan, const tactus_points *points, const tactus_outcome *outcome,
 						  tactus_fit_channel *channel)
 {
@@ -315,8 +310,8 @@ static void score_outputs(const tactus_plan *plan, const tactus_points *points, 
 	for (size_t o = 0; zero && o < TACTUS_FIT_OUTPUTS; o++) {
 		if (!plan->outputs[o] || plan->form != TACTUS_FORM_FORWARD)
 			continue;
-		channel->outputs[o].rmse = root(tactus_mean_square(outcome->residual[o], zero, points->n, NULL));
-		channel->outputs[o].cv_rmse = root(tactus_mean_square(outcome->cv_residual[o], zero, points->n, NULL));
+		channel->outputs[o].rmse = sqrt(tactus_mean_square(outcome->residual[o], zero, points->n, NULL));
+		channel->outputs[o].cv_rmse = sqrt(tactus_mean_square(outcome->cv_residual[o], zero, points->n, NULL));
 	}
 	free(zero);
 }
@@ -328,8 +323,8 @@ static void score_force(const tactus_points *points, const tactus_outcome *own, 
 	const double *reference = own->reference_N;
 	double mse = tactus_mean_square(own->estimate_N, reference, n, &channel->samples);
 	double cv_mse = tactus_mean_square(own->cv_estimate_N, reference, n, NULL);
-	channel->rmse_N = root(mse);
-	channel->cv_rmse_N = root(cv_mse);
+	channel->rmse_N = sqrt(mse);
+	channel->cv_rmse_N = sqrt(cv_mse);
 	if (conductance) {
 		channel->reference_mse_N2 = tactus_mean_square(conductance->estimate_N, conductance->reference_N, n, NULL);
 		channel->reference_cv_mse_N2 =
@@ -368,9 +363,9 @@ static void note_calibration(const tactus_work *work, const tactus_plan *plan, s
 	data->input_min = force.low;
 	data->input_max = force.high;
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
-		moments m = moments_of(points->reading[o], work->use[c], points->n);
-		if (!plan->outputs[o] || m.n == 0)
+		if (!plan->outputs[o])
 			continue;
+		moments m = moments_of(points->reading[o], work->use[c], points->n);
 		data->output_min[o] = m.low;
 		data->output_max[o] = m.high;
 	}
@@ -503,8 +498,9 @@ static int make_result(tactus_work *work, const outcomes *o, tactus_model *model
 			}
 		if (channel->problem)
 			continue;
-		score_outputs(o->plan, &work->points[c], &o->own[c], channel);
-		if (work->series[0].domain == &tactus_domain_sensor)
+		if (!work->parameters_only)
+			score_outputs(o->plan, &work->points[c], &o->own[c], channel);
+		if (work->series[0].domain == &tactus_domain_sensor && !work->parameters_only)
 			score_force(&work->points[c], &o->own[c], o->conductance ? &o->conductance[c] : NULL,
 						o->capacitance ? &o->capacitance[c] : NULL, channel);
 		note_calibration(work, o->plan, c, channel, &model->channels[c]);

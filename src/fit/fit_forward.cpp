@@ -7,406 +7,272 @@
 #include <ceres/ceres.h>
 #include <glog/logging.h>
 
-#include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
-#include <memory>
 #include <mutex>
-#include <string>
-#include <vector>
 
 #include "core/core.h"
-#include "fit/fit_internal.h"
+#include "fit/forward_problem.hpp"
 
 namespace
 {
 
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
+using namespace tactus;
+using Eigen::Index;
 
-/* A parameter that is fitted, and where it lives: effect −1 is the base. */
-struct Slot {
-	long effect;
-	size_t index;
-	const tactus_parameter *info;
-	double start, scale, lower, upper;
-};
+const size_t probe_samples = 4096; /* what decides on the structure of a longer recording */
 
-struct Row {
-	size_t output, sample;
-	double factor; /* √weight / scale of the output */
-};
-
-struct ChainFree {
-	void operator()(tactus_chain *chain) const
-	{
-		tactus_chain_free(chain);
-	}
-};
-
-bool fitted(const tactus_parameter &parameter, const bool *outputs)
-{
-	return parameter.kind != TACTUS_CONSTANT && (parameter.output < 0 || outputs[parameter.output]);
-}
-
-/* Upper triangle R of [columns | rhs] = QR, taken up in chunks that stay in the cache. */
-class Triangle
-{
-  public:
-	explicit Triangle(Eigen::Index columns) : stack(columns + chunk, columns)
-	{
-		stack.setZero();
-	}
-	void add(const MatrixXd &rows)
-	{
-		const Eigen::Index n = stack.cols();
-		for (Eigen::Index at = 0; at < rows.rows(); at += chunk) {
-			const Eigen::Index m = std::min(chunk, rows.rows() - at);
-			stack.middleRows(n, m) = rows.middleRows(at, m);
-			stack.bottomRows(chunk - m).setZero();
-			Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(stack);
-			stack.topRows(n) = MatrixXd(stack.topRows(n).triangularView<Eigen::Upper>());
-		}
-	}
-	MatrixXd r() const
-	{
-		return stack.topRows(stack.cols());
-	}
-
-  private:
-	static constexpr Eigen::Index chunk = 1024;
-	MatrixXd stack;
-};
-
+/* Upper triangle R of QR = rows, taken up in chunks that stay in the cache. */
 MatrixXd triangle(const MatrixXd &rows)
 {
-	Triangle t(rows.cols());
-	t.add(rows);
-	return t.r();
+	const Index n = rows.cols(), chunk = 512;
+	MatrixXd stack = MatrixXd::Zero(n + chunk, n);
+	VectorXd scratch(n), tau(n);
+	for (Index at = 0; at < rows.rows(); at += chunk) {
+		const Index m = std::min(chunk, rows.rows() - at);
+		stack.middleRows(n, m) = rows.middleRows(at, m);
+		stack.bottomRows(chunk - m).setZero();
+		Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(stack);
+		stack.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
+	}
+	return stack.topRows(n);
 }
 
-class Fit
-{
-  public:
-	Fit(const tactus_series *s, const tactus_effect *const *e, size_t count, const double *const *w,
-		tactus_model_channel_data *c)
-		: series(s), effects(e, e + count), data(c)
-	{
-		for (size_t signal_index = 0; signal_index < s->domain->signal_count; signal_index++)
-			if (s->domain->signals[signal_index].role == TACTUS_ROLE_OUTPUT && output_count < TACTUS_OUTPUTS_MAX)
-				output_signal[output_count++] = signal_index;
-		for (size_t o = 0; o < output_count; o++) {
-			weight[o] = w[o];
-			outputs[o] = w[o] && s->signal[output_signal[o]];
-		}
-		for (size_t i = 0; i < s->domain->signal_count && !(input_range > 0); i++)
-			if (s->domain->signals[i].role == TACTUS_ROLE_INPUT && s->signal[i])
-				input_range = tactus_series_maximum(s, int(i)) - tactus_series_minimum(s, int(i));
-	}
-
-	int run(bool refit);
-
-  private:
-	int collect_rows();
-	double unit_range(const std::string &unit) const;
-	void collect_slots(bool refit);
-	void set_factors();
-	bool simulate(const VectorXd &values, VectorXd &y) const;
-	void find_linear();
-	bool affine_with(const std::vector<size_t> &chosen, size_t candidate, const std::vector<VectorXd> &at) const;
-	bool columns(const VectorXd &values, MatrixXd &phi, VectorXd &rest);
-	bool eliminate(VectorXd &values, MatrixXd &phi, VectorXd &residual);
-	bool derivatives(const VectorXd &values, MatrixXd &d) const;
-	int minimise();
-	int solve();
-	bool demote();
-	bool confirmed();
-	void report();
-	void store(const VectorXd &errors, double correction);
-	double autocorrelation(const VectorXd &residual) const;
-
-	friend class Projected;
-
-	const tactus_series *series;
-	std::vector<const tactus_effect *> effects;
-	tactus_model_channel_data *data;
-	size_t output_count = 0;
-	size_t output_signal[TACTUS_OUTPUTS_MAX] = {};
-	const double *weight[TACTUS_OUTPUTS_MAX] = {};
-	bool outputs[TACTUS_OUTPUTS_MAX] = {};
-	double output_scale[TACTUS_OUTPUTS_MAX] = {}, output_range[TACTUS_OUTPUTS_MAX] = {}, input_range = 0;
-
-	std::unique_ptr<tactus_chain, ChainFree> chain;
-	mutable std::vector<std::vector<double>> buffer;
-	std::vector<Row> rows;
-	VectorXd measured; /* reading × factor */
-	std::vector<Slot> slots;
+/* Which parameters are eliminated, which are left to Ceres; the others (fixed) only repeat what these say. */
+struct Structure {
 	std::vector<size_t> linear, nonlinear;
-	std::vector<double> delta; /* step of each linear parameter that moves the outputs by about their spread */
-	std::vector<char> never_linear;
-	bool reuse = true;          /* columns that did not depend on the nonlinear parameters are kept */
-	std::vector<char> constant; /* of each linear parameter's column; the last is the rest */
-	MatrixXd kept;
-	VectorXd kept_rest;
-	VectorXd best; /* all values */
+	std::vector<char> constant;     /* of each linear parameter's column, then of the rest: never changes */
+	std::vector<double> delta;      /* step of each slot that moves the outputs by about their spread */
+	std::vector<char> never_linear; /* per slot */
+	bool may_keep = true;           /* constant columns may be kept */
 };
 
-int Fit::collect_rows()
+double step_inside(const Slot &s, double value, double h)
 {
-	rows.clear();
-	for (size_t o = 0; o < output_count; o++) {
-		if (!outputs[o])
-			continue;
-		const double *y = series->signal[output_signal[o]];
-		double low = INFINITY, high = -INFINITY, mean = 0, square = 0, n = 0;
-		for (size_t i = 0; i < series->n; i++) {
-			if (!(weight[o][i] > 0) || !std::isfinite(y[i]))
-				continue;
-			rows.push_back({o, i, std::sqrt(weight[o][i])});
-			low = std::fmin(low, y[i]);
-			high = std::fmax(high, y[i]);
-			n++;
-			const double d = y[i] - mean;
-			mean += d / n;
-			square += d * (y[i] - mean);
-		}
-		output_range[o] = high - low;
-		output_scale[o] = std::sqrt(square / n);
-		if (!(output_scale[o] > 0))
-			return tactus_fail(TACTUS_ERR_DATA, "%s never changes", series->output_name[o]);
-	}
-	return TACTUS_OK;
+	return value + h <= s.upper ? value + h : value - h >= s.lower ? value - h : value;
 }
 
-void Fit::set_factors()
-{
-	measured.resize(Eigen::Index(rows.size()));
-	for (size_t r = 0; r < rows.size(); r++) {
-		const Row &row = rows[r];
-		measured[Eigen::Index(r)] =
-			series->signal[output_signal[row.output]][row.sample] * row.factor / output_scale[row.output];
-	}
-}
-
-/* Ranges in a unit such as "output0/N": start and scale of a parameter are stated for a range of 1 (engine.h). */
-double Fit::unit_range(const std::string &unit) const
-{
-	const size_t slash = unit.find('/');
-	auto range = [&](const std::string &word) {
-		if (word == "N" && input_range > 0)
-			return input_range;
-		for (size_t o = 0; o < output_count; o++)
-			if (word == "output" + std::to_string(o) && output_range[o] > 0)
-				return output_range[o];
-		return 1.0;
-	};
-	return range(unit.substr(0, slash)) / (slash == std::string::npos ? 1 : range(unit.substr(slash + 1)));
-}
-
-/* What is fitted, where it starts; a constant is stated for the range of these data unless the model states it. */
-void Fit::collect_slots(bool refit)
-{
-	auto add = [&](long effect, size_t index, const tactus_parameter &info, double &value) {
-		const double unit = unit_range(info.unit);
-		double start = refit && std::isfinite(value) ? value : info.start * unit;
-		start = std::fmin(std::fmax(start, info.lower), info.upper);
-		if (info.kind == TACTUS_CONSTANT)
-			value = start;
-		else if (fitted(info, outputs))
-			slots.push_back({effect, index, &info, start, info.scale * unit, info.lower, info.upper});
-	};
-	for (size_t i = 0; i < series->domain->base_count; i++)
-		add(-1, i, series->domain->base[i], data->base[i]);
-	for (size_t k = 0; k < effects.size(); k++)
-		for (size_t i = 0; i < effects[k]->parameter_count; i++)
-			add(long(k), i, effects[k]->parameters[i], data->effect[k][i]);
-	never_linear.assign(slots.size(), 0);
-}
-
-/* The chain with these values, at the rows, weighted. False if anything there is not finite. */
-bool Fit::simulate(const VectorXd &values, VectorXd &y) const
-{
-	double base[TACTUS_PARAMETERS_MAX];
-	std::vector<std::vector<double>> parameters(effects.size());
-	std::copy_n(data->base, series->domain->base_count, base);
-	for (size_t k = 0; k < effects.size(); k++)
-		parameters[k].assign(data->effect[k], data->effect[k] + effects[k]->parameter_count);
-	for (size_t j = 0; j < slots.size(); j++) {
-		const double value = values[Eigen::Index(j)];
-		if (slots[j].effect < 0)
-			base[slots[j].index] = value;
-		else
-			parameters[size_t(slots[j].effect)][slots[j].index] = value;
-	}
-	tactus_chain_set(chain.get(), -1, base);
-	for (size_t k = 0; k < effects.size(); k++)
-		tactus_chain_set(chain.get(), long(k), parameters[k].data());
-	tactus_chain_reset(chain.get());
-
-	double *signal[TACTUS_SIGNALS_MAX] = {};
-	for (size_t s = 0; s < series->domain->signal_count; s++)
-		signal[s] = series->signal[s];
-	for (size_t o = 0; o < output_count; o++)
-		signal[output_signal[o]] = outputs[o] ? buffer[o].data() : nullptr;
-	if (tactus_chain_run(chain.get(), series->n, signal) != TACTUS_OK)
-		return false;
-
-	y.resize(Eigen::Index(rows.size()));
-	for (size_t r = 0; r < rows.size(); r++)
-		y[Eigen::Index(r)] = buffer[rows[r].output][rows[r].sample] * rows[r].factor / output_scale[rows[r].output];
-	return y.allFinite();
-}
-
-/*
- * Affine in the chosen parameters and the candidate together: all second differences vanish to rounding, at every
- * point of `at`.
+/* ---- the structure --------------------------------------------------------------------------------------------------
  */
-bool Fit::affine_with(const std::vector<size_t> &chosen, size_t candidate, const std::vector<VectorXd> &at) const
+
+class Explorer
 {
-	const auto index = Eigen::Index(candidate);
-	for (const VectorXd &point : at) {
-		VectorXd y0, ya, yb, yab;
-		VectorXd values = point;
-		if (!simulate(values, y0))
-			return false;
-		values[index] += delta[candidate];
-		if (!simulate(values, ya))
-			return false;
-		std::vector<size_t> partners = chosen;
-		partners.push_back(candidate);
-		for (size_t partner : partners) {
-			VectorXd other = point, both = values;
-			other[Eigen::Index(partner)] += delta[partner];
-			both[Eigen::Index(partner)] += delta[partner];
-			if (!simulate(other, yb) || !simulate(both, yab))
-				return false;
-			const double size = std::max(y0.lpNorm<Eigen::Infinity>(), yab.lpNorm<Eigen::Infinity>());
-			if ((yab - ya - yb + y0).lpNorm<Eigen::Infinity>() > 1e-11 * size)
-				return false;
+  public:
+	Explorer(ForwardProblem &p, Structure &s) : problem(p), structure(s), start(Index(p.slots.size())), other(start)
+	{
+		for (size_t j = 0; j < p.slots.size(); j++) {
+			const Slot &slot = p.slots[j];
+			start[Index(j)] = slot.start;
+			other[Index(j)] = step_inside(slot, slot.start, 0.37 * slot.scale);
 		}
 	}
-	return true;
-}
 
-/*
- * Chooses the parameters to eliminate, base first. A parameter that only repeats others is left at its start. Nothing
- * here is a proof; confirmed() checks the result.
- */
-void Fit::find_linear()
-{
-	VectorXd start(Eigen::Index(slots.size())), other(Eigen::Index(slots.size()));
-	for (size_t j = 0; j < slots.size(); j++) {
-		const Slot &s = slots[j];
-		const auto i = Eigen::Index(j);
-		start[i] = s.start;
-		const double up = s.start + 0.37 * s.scale;
-		other[i] = up <= s.upper ? up : s.start - 0.37 * s.scale >= s.lower ? s.start - 0.37 * s.scale : s.start;
+	/* Base first. Nothing here is a proof; Solver::confirmed() checks the result. */
+	void explore()
+	{
+		structure.linear.clear();
+		structure.nonlinear.clear();
+		structure.delta.assign(problem.slots.size(), 0);
+		for (size_t j = 0; j < problem.slots.size(); j++) {
+			const bool linear =
+				!structure.never_linear[j] && problem.slots[j].info->kind != TACTUS_SHAPE && find_delta(j) && affine(j);
+			if (!linear)
+				structure.nonlinear.push_back(j);
+			else if (independent(j))
+				structure.linear.push_back(j);
+		}
+		find_constant();
 	}
-	linear.clear();
-	delta.assign(slots.size(), 0);
-	MatrixXd basis(Eigen::Index(rows.size()), 0);
-	for (size_t j = 0; j < slots.size(); j++) {
-		if (never_linear[j] || slots[j].info->kind == TACTUS_SHAPE)
-			continue;
+
+  private:
+	bool find_delta(size_t j)
+	{
 		VectorXd y0, y1, values = start;
-		delta[j] = slots[j].scale;
-		if (!simulate(values, y0))
-			continue;
-		for (int pass = 0; pass < 2; pass++) {
-			values[Eigen::Index(j)] = start[Eigen::Index(j)] + delta[j];
-			if (!simulate(values, y1))
-				break;
-			const double moved = (y1 - y0).norm();
-			if (!(moved > 0))
-				break;
-			delta[j] *= measured.norm() / moved;
-		}
-		if (y1.size() != y0.size() || !affine_with(linear, j, {start, other}))
-			continue;
-		linear.push_back(j);
-	}
-	best = start;
-}
-
-/* Column of every linear parameter per unit, and the rest: the outputs with all of them at zero. */
-bool Fit::columns(const VectorXd &values, MatrixXd &phi, VectorXd &rest)
-{
-	VectorXd zero = values;
-	for (size_t l : linear)
-		zero[Eigen::Index(l)] = 0;
-	const bool first = kept.cols() != Eigen::Index(linear.size());
-	if (first) {
-		constant.assign(linear.size() + 1, 0);
-		kept.resize(Eigen::Index(rows.size()), Eigen::Index(linear.size()));
-	}
-	if (constant.back())
-		rest = kept_rest;
-	else if (!simulate(zero, rest))
-		return false;
-	phi.resize(Eigen::Index(rows.size()), Eigen::Index(linear.size()));
-	for (size_t c = 0; c < linear.size(); c++) {
-		const auto column = Eigen::Index(c), at = Eigen::Index(linear[c]);
-		if (constant[c]) {
-			phi.col(column) = kept.col(column);
-			continue;
-		}
-		VectorXd one = zero, y;
-		one[at] = delta[linear[c]];
-		if (!simulate(one, y))
+		double &delta = structure.delta[j];
+		delta = problem.slots[j].scale;
+		if (!problem.simulate(values, y0))
 			return false;
-		phi.col(column) = (y - rest) / delta[linear[c]];
+		for (int pass = 0; pass < 2; pass++) {
+			values[Index(j)] = start[Index(j)] + delta;
+			if (!problem.simulate(values, y1) || !((y1 - y0).norm() > 0))
+				return false;
+			delta *= problem.measured.norm() / (y1 - y0).norm();
+		}
+		return std::isfinite(delta);
+	}
+
+	/* Affine in the linear ones and the candidate together: all second differences vanish to rounding. */
+	bool affine(size_t candidate)
+	{
+		std::vector<size_t> partners = structure.linear;
+		partners.push_back(candidate);
+		VectorXd y0, ya, yb, yab;
+		for (const VectorXd &point : {start, other}) {
+			VectorXd moved = point;
+			moved[Index(candidate)] += structure.delta[candidate];
+			if (!problem.simulate(point, y0) || !problem.simulate(moved, ya))
+				return false;
+			for (size_t partner : partners) {
+				VectorXd single = point, both = moved;
+				single[Index(partner)] += structure.delta[partner];
+				both[Index(partner)] += structure.delta[partner];
+				if (!problem.simulate(single, yb) || !problem.simulate(both, yab))
+					return false;
+				const double size = std::max(y0.lpNorm<Eigen::Infinity>(), yab.lpNorm<Eigen::Infinity>());
+				if ((yab - ya - yb + y0).lpNorm<Eigen::Infinity>() > 1e-11 * size)
+					return false;
+			}
+		}
+		return true;
+	}
+
+	bool column(const VectorXd &point, size_t j, VectorXd &result)
+	{
+		VectorXd y0, moved = point;
+		moved[Index(j)] += structure.delta[j];
+		if (!problem.simulate(point, y0) || !problem.simulate(moved, result))
+			return false;
+		result -= y0;
+		return true;
+	}
+
+	/* False if the candidate's column is a combination of the others': it stays at its start. */
+	bool independent(size_t candidate)
+	{
+		MatrixXd all(problem.measured.size(), Index(structure.linear.size()) + 1);
+		VectorXd y;
+		std::vector<size_t> order = structure.linear;
+		order.push_back(candidate);
+		for (size_t c = 0; c < order.size(); c++) {
+			if (!column(other, order[c], y))
+				return false;
+			all.col(Index(c)) = y;
+		}
+		const MatrixXd r = triangle(all);
+		return std::abs(r(r.rows() - 1, r.cols() - 1)) > 1e-9 * r.col(r.cols() - 1).norm();
+	}
+
+	/* Columns (and the rest) that are the same bits at two unlike points of the nonlinear parameters. */
+	void find_constant()
+	{
+		structure.constant.assign(structure.linear.size() + 1, 0);
+		VectorXd first = start, second = other, a, b;
+		for (size_t l : structure.linear)
+			first[Index(l)] = second[Index(l)] = 0;
+		if (!structure.may_keep || !problem.simulate(first, a) || !problem.simulate(second, b))
+			return;
+		structure.constant.back() = a == b;
+		for (size_t c = 0; c < structure.linear.size() && structure.constant.back(); c++) {
+			const auto at = Index(structure.linear[c]);
+			first[at] = second[at] = structure.delta[structure.linear[c]];
+			structure.constant[c] = problem.simulate(first, a) && problem.simulate(second, b) && a == b;
+			first[at] = second[at] = 0;
+		}
+	}
+
+	ForwardProblem &problem;
+	Structure &structure;
+	VectorXd start, other;
+};
+
+/* ---- the solution ---------------------------------------------------------------------------------------------------
+ */
+
+class Solver
+{
+  public:
+	Solver(ForwardProblem &p, const Structure &s) : problem(p), structure(s), best(Index(p.slots.size()))
+	{
+		for (size_t j = 0; j < p.slots.size(); j++)
+			best[Index(j)] = p.slots[j].start;
+	}
+
+	int minimise();
+	bool confirmed();
+	/* The best linear parameters for the nonlinear ones in values, put there; columns per delta, and what remains. */
+	bool eliminate(VectorXd &values);
+	/* Outputs' derivatives to the nonlinear parameters, after eliminate(values). */
+	bool derivatives(const VectorXd &values, MatrixXd &d);
+
+	ForwardProblem &problem;
+	const Structure &structure;
+	VectorXd best, residual;
+	MatrixXd phi;
+
+  private:
+	bool columns(const VectorXd &values);
+
+	VectorXd rest, y, last; /* last: the nonlinear values that phi and residual belong to */
+	VectorXd last_beta;
+};
+
+bool Solver::columns(const VectorXd &values)
+{
+	const bool first = phi.cols() != Index(structure.linear.size()) || rest.size() == 0;
+	VectorXd point = values;
+	for (size_t l : structure.linear)
+		point[Index(l)] = 0;
+	if ((first || !structure.constant.back()) && !problem.simulate(point, rest))
+		return false;
+	phi.resize(problem.measured.size(), Index(structure.linear.size()));
+	for (size_t c = 0; c < structure.linear.size(); c++) {
+		if (!first && structure.constant[c])
+			continue;
+		const auto at = Index(structure.linear[c]);
+		point[at] = structure.delta[structure.linear[c]];
+		if (!problem.simulate(point, y))
+			return false;
+		phi.col(Index(c)) = y - rest;
+		point[at] = 0;
 	}
 	return true;
 }
 
-/* The best linear parameters for these nonlinear ones, put into values; the residual that remains. */
-bool Fit::eliminate(VectorXd &values, MatrixXd &phi, VectorXd &residual)
+bool Solver::eliminate(VectorXd &values)
 {
-	VectorXd rest;
-	if (!columns(values, phi, rest))
-		return false;
-	residual = measured - rest;
-	const auto l = Eigen::Index(linear.size());
-	if (l == 0)
-		return true;
-	MatrixXd augmented(phi.rows(), l + 1);
-	augmented << phi, residual;
-	for (Eigen::Index c = 0; c < l; c++)
-		augmented.col(c) *= delta[linear[size_t(c)]];
-	const MatrixXd r = triangle(augmented);
-	const VectorXd diagonal = r.diagonal().head(l).cwiseAbs();
-	if (!(diagonal.minCoeff() > 1e-12 * diagonal.maxCoeff()))
-		return false;
-	const VectorXd beta = r.topLeftCorner(l, l).triangularView<Eigen::Upper>().solve(r.col(l).head(l));
-	if (!beta.allFinite())
-		return false;
-	for (Eigen::Index c = 0; c < l; c++) {
-		values[Eigen::Index(linear[size_t(c)])] = beta[c] * delta[linear[size_t(c)]];
-		residual -= augmented.col(c) * beta[c];
+	const auto l = Index(structure.linear.size());
+	VectorXd now(Index(structure.nonlinear.size()));
+	for (size_t k = 0; k < structure.nonlinear.size(); k++)
+		now[Index(k)] = values[Index(structure.nonlinear[k])];
+	if (last.size() != now.size() || residual.size() == 0 || last != now) {
+		residual.resize(0);
+		if (!columns(values)) {
+			phi.resize(0, 0);
+			return false;
+		}
+		MatrixXd augmented(phi.rows(), l + 1);
+		augmented << phi, problem.measured - rest;
+		const MatrixXd r = triangle(augmented);
+		const VectorXd diagonal = r.diagonal().head(l).cwiseAbs();
+		if (l && !(diagonal.minCoeff() > 1e-12 * diagonal.maxCoeff()))
+			return false;
+		last_beta = r.topLeftCorner(l, l).triangularView<Eigen::Upper>().solve(r.col(l).head(l));
+		residual = augmented.col(l) - phi * last_beta;
+		last = now;
 	}
-	return true;
+	for (Index c = 0; c < l; c++)
+		values[Index(structure.linear[size_t(c)])] = last_beta[c] * structure.delta[structure.linear[size_t(c)]];
+	return last_beta.allFinite() && residual.allFinite();
 }
 
-/* Outputs' derivatives to the nonlinear parameters: a small step each, a larger one where that moves nothing. */
-bool Fit::derivatives(const VectorXd &values, MatrixXd &d) const
+/* A small step each, a larger one where that moves nothing. */
+bool Solver::derivatives(const VectorXd &values, MatrixXd &d)
 {
-	d.resize(Eigen::Index(rows.size()), Eigen::Index(nonlinear.size()));
-	VectorXd y0, y;
-	if (nonlinear.empty())
-		return true;
-	if (!simulate(values, y0))
-		return false;
-	for (size_t k = 0; k < nonlinear.size(); k++) {
-		const Slot &s = slots[nonlinear[k]];
-		const auto at = Eigen::Index(nonlinear[k]), column = Eigen::Index(k);
+	d.resize(problem.measured.size(), Index(structure.nonlinear.size()));
+	const VectorXd y0 = problem.measured - residual;
+	for (size_t k = 0; k < structure.nonlinear.size(); k++) {
+		const Slot &s = problem.slots[structure.nonlinear[k]];
+		const auto at = Index(structure.nonlinear[k]);
 		for (const double step : {1e-6, 1e-2}) {
 			VectorXd moved = values;
-			const double h = s.scale * step;
-			moved[at] += values[at] + h <= s.upper ? h : -h;
-			if (!simulate(moved, y))
+			moved[at] = step_inside(s, values[at], s.scale * step);
+			if (!problem.simulate(moved, y))
 				return false;
-			d.col(column) = (y - y0) / (moved[at] - values[at]);
-			if (d.col(column).squaredNorm() > 0)
+			d.col(Index(k)) = (y - y0) / (moved[at] - values[at]);
+			/* What rounding alone may have moved is no movement. */
+			if ((y - y0).norm() > 1e-12 * y0.norm())
 				break;
+			d.col(Index(k)).setZero();
 		}
 	}
 	return d.allFinite();
@@ -416,32 +282,30 @@ bool Fit::derivatives(const VectorXd &values, MatrixXd &d) const
 class Projected : public ceres::CostFunction
 {
   public:
-	explicit Projected(Fit *f) : fit(f)
+	explicit Projected(Solver *s) : solver(s)
 	{
-		set_num_residuals(int(f->nonlinear.size()) + 1);
-		mutable_parameter_block_sizes()->push_back(int(f->nonlinear.size()));
+		set_num_residuals(int(s->structure.nonlinear.size()) + 1);
+		mutable_parameter_block_sizes()->push_back(int(s->structure.nonlinear.size()));
 	}
 	bool Evaluate(double const *const *parameters, double *residuals, double **jacobians) const override
 	{
-		const auto k = Eigen::Index(fit->nonlinear.size()), l = Eigen::Index(fit->linear.size());
-		VectorXd values = fit->best, residual;
-		for (size_t i = 0; i < fit->nonlinear.size(); i++)
-			values[Eigen::Index(fit->nonlinear[i])] = parameters[0][i];
-		MatrixXd phi, d;
-		if (!fit->eliminate(values, phi, residual))
+		const auto k = Index(solver->structure.nonlinear.size()), l = Index(solver->structure.linear.size());
+		VectorXd values = solver->best;
+		for (Index i = 0; i < k; i++)
+			values[Index(solver->structure.nonlinear[size_t(i)])] = parameters[0][i];
+		if (!solver->eliminate(values))
 			return false;
 		Eigen::Map<VectorXd> out(residuals, k + 1);
 		if (!jacobians || !jacobians[0]) {
 			out.setZero();
-			out[k] = residual.norm();
+			out[k] = solver->residual.norm();
 			return true;
 		}
-		if (!fit->derivatives(values, d))
+		MatrixXd d;
+		if (!solver->derivatives(values, d))
 			return false;
-		MatrixXd all(residual.size(), l + k + 1);
-		all << phi, d, residual;
-		for (Eigen::Index c = 0; c < l; c++)
-			all.col(c) *= fit->delta[fit->linear[size_t(c)]];
+		MatrixXd all(solver->residual.size(), l + k + 1);
+		all << solver->phi, d, solver->residual;
 		const MatrixXd r = triangle(all);
 		out = r.block(l, l + k, k + 1, 1);
 		Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> j(jacobians[0], k + 1, k);
@@ -450,213 +314,215 @@ class Projected : public ceres::CostFunction
 	}
 
   private:
-	Fit *fit;
+	Solver *solver;
 };
 
-int Fit::minimise()
+int Solver::minimise()
 {
-	kept.resize(0, 0);
-	nonlinear.clear();
-	for (size_t j = 0; j < slots.size(); j++)
-		if (std::find(linear.begin(), linear.end(), j) == linear.end())
-			nonlinear.push_back(j);
-	MatrixXd phi;
-	VectorXd residual;
-	if (!eliminate(best, phi, residual))
-		return tactus_fail(TACTUS_ERR_DATA, "the model's parameters cannot be told apart in these data");
-	if (nonlinear.empty())
+	if (!eliminate(best))
+		return tactus_fail(TACTUS_ERR_DATA,
+						   "the model gives no finite reading at these inputs, or its parameters cannot "
+						   "be told apart there");
+	if (structure.nonlinear.empty())
 		return TACTUS_OK;
-
 	std::vector<double> alpha;
-	for (size_t j : nonlinear)
-		alpha.push_back(best[Eigen::Index(j)]);
-	ceres::Problem problem;
-	problem.AddResidualBlock(new Projected(this), nullptr, alpha.data());
-	for (size_t k = 0; k < nonlinear.size(); k++) {
-		if (std::isfinite(slots[nonlinear[k]].lower))
-			problem.SetParameterLowerBound(alpha.data(), int(k), slots[nonlinear[k]].lower);
-		if (std::isfinite(slots[nonlinear[k]].upper))
-			problem.SetParameterUpperBound(alpha.data(), int(k), slots[nonlinear[k]].upper);
+	for (size_t j : structure.nonlinear)
+		alpha.push_back(best[Index(j)]);
+	ceres::Problem ceres_problem;
+	ceres_problem.AddResidualBlock(new Projected(this), nullptr, alpha.data());
+	for (size_t k = 0; k < structure.nonlinear.size(); k++) {
+		const Slot &s = problem.slots[structure.nonlinear[k]];
+		if (std::isfinite(s.lower))
+			ceres_problem.SetParameterLowerBound(alpha.data(), int(k), s.lower);
+		if (std::isfinite(s.upper))
+			ceres_problem.SetParameterUpperBound(alpha.data(), int(k), s.upper);
 	}
 	ceres::Solver::Options options;
 	options.linear_solver_type = ceres::DENSE_QR;
 	options.logging_type = ceres::SILENT;
-	options.minimizer_progress_to_stdout = false;
 	options.max_num_iterations = 200;
-	options.function_tolerance = 1e-11;
+	options.function_tolerance = 1e-10;
 	options.gradient_tolerance = 1e-14;
-	options.parameter_tolerance = 1e-10;
+	options.parameter_tolerance = 1e-9;
 	ceres::Solver::Summary summary;
-	ceres::Solve(options, &problem, &summary);
+	ceres::Solve(options, &ceres_problem, &summary);
 	if (summary.termination_type == ceres::NO_CONVERGENCE)
 		return tactus_fail(TACTUS_ERR_CONVERGENCE, "the fit did not converge in %d iterations",
 						   options.max_num_iterations);
 	if (!summary.IsSolutionUsable())
-		return tactus_fail(TACTUS_ERR_CONVERGENCE, "the fit failed: no step makes it better, or a value is not finite");
-	for (size_t k = 0; k < nonlinear.size(); k++)
-		best[Eigen::Index(nonlinear[k])] = alpha[k];
-	return eliminate(best, phi, residual) ? TACTUS_OK
-										  : tactus_fail(TACTUS_ERR_CONVERGENCE, "the fit ended where it is singular");
-}
-
-/* Linear parameters that left their bounds become nonlinear ones, which Ceres keeps inside; true if there were any. */
-bool Fit::demote()
-{
-	bool any = false;
-	for (size_t j : linear) {
-		double &value = best[Eigen::Index(j)];
-		const double inside = std::fmin(std::fmax(value, slots[j].lower), slots[j].upper);
-		if (inside == value)
-			continue;
-		never_linear[j] = 1;
-		slots[j].start = inside;
-		any = true;
-	}
-	return any;
+		return tactus_fail(TACTUS_ERR_CONVERGENCE, "the fit failed: a value of the model is not finite");
+	for (size_t k = 0; k < structure.nonlinear.size(); k++)
+		best[Index(structure.nonlinear[k])] = alpha[k];
+	return eliminate(best) ? TACTUS_OK : tactus_fail(TACTUS_ERR_CONVERGENCE, "the fit ended where it is singular");
 }
 
 /* The whole chain at the result agrees with what elimination said of it. */
-bool Fit::confirmed()
+bool Solver::confirmed()
 {
-	MatrixXd phi;
-	VectorXd values = best, residual, y;
-	if (!eliminate(values, phi, residual) || !simulate(best, y))
-		return false;
-	return (measured - residual - y).lpNorm<Eigen::Infinity>() < 1e-8 * measured.lpNorm<Eigen::Infinity>();
+	return eliminate(best) && problem.simulate(best, y) &&
+		   (problem.measured - residual - y).lpNorm<Eigen::Infinity>() <
+			   1e-8 * problem.measured.lpNorm<Eigen::Infinity>();
 }
 
-int Fit::solve()
-{
-	for (int attempt = 0; attempt < 8; attempt++) {
-		set_factors();
-		find_linear();
-		const int status = minimise();
-		if (status != TACTUS_OK)
-			return status;
-		if (demote())
-			continue;
-		if (linear.empty() || confirmed())
-			return TACTUS_OK;
-		for (size_t j : linear)
-			never_linear[j] = slots[j].effect >= 0 || attempt > 0;
-	}
-	return tactus_fail(TACTUS_ERR_CONVERGENCE, "the fit found no parameters within their bounds");
-}
+/* ---- errors ---------------------------------------------------------------------------------------------------------
+ */
 
 /* Lag-one autocorrelation of the residual within outputs, 0 if negative: neighbours say less than they seem to. */
-double Fit::autocorrelation(const VectorXd &residual) const
+double autocorrelation(const ForwardProblem &problem, const VectorXd &residual)
 {
-	double product = 0, square = 0;
-	for (size_t r = 0; r + 1 < rows.size(); r++) {
-		const double e = residual[Eigen::Index(r)];
-		square += e * e;
-		if (rows[r + 1].output == rows[r].output)
-			product += e * residual[Eigen::Index(r + 1)];
-	}
+	double product = 0;
+	for (size_t r = 0; r + 1 < problem.rows.size(); r++)
+		if (problem.rows[r + 1].output == problem.rows[r].output)
+			product += residual[Index(r)] * residual[Index(r + 1)];
+	const double square = residual.squaredNorm();
 	return square > 0 ? std::fmin(std::fmax(product / square, 0.0), 0.99) : 0;
-}
-
-void Fit::store(const VectorXd &errors, double correction)
-{
-	for (size_t j = 0; j < slots.size(); j++) {
-		const Slot &s = slots[j];
-		const auto at = Eigen::Index(j);
-		const bool bound = best[at] <= s.lower || best[at] >= s.upper;
-		double *value = s.effect < 0 ? data->base : data->effect[s.effect];
-		double *std = s.effect < 0 ? data->base_std : data->effect_std[s.effect];
-		value[s.index] = best[at];
-		std[s.index] = bound ? NAN : errors[at] * correction;
-	}
 }
 
 /*
  * Standard errors: s² (J'J)⁻¹ with s² the residual variance, times (1 + φ)/(1 − φ) for a residual of lag-one
  * autocorrelation φ (the effective number of samples of an AR(1) process). NaN: at a bound, or not determined.
  */
-void Fit::report()
+VectorXd standard_errors(Solver &solver)
 {
-	MatrixXd phi, d;
-	VectorXd residual, values = best;
-	const auto p = Eigen::Index(slots.size()), n = Eigen::Index(rows.size());
-	VectorXd errors = VectorXd::Constant(p, NAN);
-	if (!eliminate(values, phi, residual) || !derivatives(best, d)) {
-		store(errors, NAN);
-		return;
-	}
-	std::vector<size_t> order(linear);
-	order.insert(order.end(), nonlinear.begin(), nonlinear.end());
+	const ForwardProblem &problem = solver.problem;
+	const Structure &structure = solver.structure;
+	VectorXd errors = VectorXd::Constant(Index(problem.slots.size()), NAN);
+	MatrixXd d;
+	if (!solver.eliminate(solver.best) || !solver.derivatives(solver.best, d))
+		return errors;
+	std::vector<size_t> order = structure.linear;
+	order.insert(order.end(), structure.nonlinear.begin(), structure.nonlinear.end());
+	const Index n = problem.measured.size(), p = Index(order.size());
 	MatrixXd all(n, p);
-	all << phi, d;
-	VectorXd norm(p);
-	for (Eigen::Index c = 0; c < p; c++) {
-		norm[c] = all.col(c).norm();
-		const Slot &s = slots[order[size_t(c)]];
-		const double at = best[Eigen::Index(order[size_t(c)])];
-		if (!(norm[c] > 0) || at <= s.lower || at >= s.upper)
-			norm[c] = INFINITY; /* takes no part */
-		all.col(c) /= norm[c];
+	all << solver.phi, d;
+	VectorXd size(p); /* of a column, per unit of its parameter */
+	for (Index c = 0; c < p; c++) {
+		const size_t j = order[size_t(c)];
+		const bool bound =
+			solver.best[Index(j)] <= problem.slots[j].lower || solver.best[Index(j)] >= problem.slots[j].upper;
+		const double norm = bound ? 0 : all.col(c).norm();
+		all.col(c) *= norm > 0 ? 1 / norm : 0;
+		size[c] = c < Index(structure.linear.size()) ? norm / structure.delta[j] : norm;
 	}
 	Eigen::ColPivHouseholderQR<MatrixXd> qr;
 	qr.setThreshold(1e-9);
 	qr.compute(triangle(all));
-	const Eigen::Index rank = qr.rank();
-	MatrixXd inverse =
+	const Index rank = qr.rank();
+	const MatrixXd inverse =
 		qr.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>().solve(MatrixXd::Identity(rank, rank));
-	const double variance = n > p ? residual.squaredNorm() / double(n - p) : NAN;
-	for (Eigen::Index c = 0; c < rank; c++) {
-		const Eigen::Index column = qr.colsPermutation().indices()[c];
-		errors[Eigen::Index(order[size_t(column)])] = inverse.row(c).norm() * std::sqrt(variance) / norm[column];
+	const double f = autocorrelation(problem, solver.residual);
+	const double variance = n > p ? solver.residual.squaredNorm() / double(n - p) * (1 + f) / (1 - f) : NAN;
+	for (Index c = 0; c < rank; c++) {
+		const Index column = qr.colsPermutation().indices()[c];
+		errors[Index(order[size_t(column)])] = inverse.row(c).norm() * std::sqrt(variance) / size[column];
 	}
-	const double f = autocorrelation(residual);
-	store(errors, std::sqrt((1 + f) / (1 - f)));
-	for (size_t o = 0; o < output_count; o++) {
-		double square = 0, count = 0;
-		for (size_t r = 0; r < rows.size(); r++) {
-			if (rows[r].output != o)
-				continue;
-			square += residual[Eigen::Index(r)] * residual[Eigen::Index(r)];
-			count++;
-		}
-		if (!outputs[o])
-			continue;
-		const double share = double(p) * count / double(n); /* of the parameters */
-		data->residual_std[o] = count > share ? output_scale[o] * std::sqrt(square / (count - share)) : NAN;
-	}
+	return errors;
 }
 
-int Fit::run(bool refit)
+/* Standard deviation of each output about the model; the parameters are shared out by the number of readings. */
+void residual_std(const ForwardProblem &problem, const VectorXd &residual, double *result)
 {
-	int status = collect_rows();
-	if (status != TACTUS_OK)
-		return status;
-	collect_slots(refit);
-	if (rows.size() <= slots.size())
-		return tactus_fail(TACTUS_ERR_DATA, "%zu readings are too few for %zu parameters", rows.size(), slots.size());
-	const double *parameters[TACTUS_EFFECTS_MAX];
-	for (size_t k = 0; k < effects.size(); k++)
-		parameters[k] = data->effect[k];
-	tactus_chain *made = nullptr;
-	status = tactus_chain_new(series->domain, data->base, effects.data(), parameters, effects.size(), &made);
-	if (status != TACTUS_OK)
-		return status;
-	chain.reset(made);
-	buffer.assign(output_count, std::vector<double>(series->n));
-	status = solve();
-	if (status != TACTUS_OK)
-		return status;
-	report();
-	if (output_count > 1 && outputs[0] && outputs[1] && !nonlinear.empty()) {
-		/* Each output by its own noise, once: what one output says well must not drown in the other's. */
-		for (size_t o = 0; o < output_count; o++)
-			if (outputs[o] && data->residual_std[o] > 1e-9 * output_scale[o])
-				output_scale[o] = data->residual_std[o];
-		for (size_t j = 0; j < slots.size(); j++)
-			slots[j].start = best[Eigen::Index(j)];
-		status = solve();
-		if (status == TACTUS_OK)
-			report();
+	double square[TACTUS_OUTPUTS_MAX] = {}, count[TACTUS_OUTPUTS_MAX] = {};
+	for (size_t r = 0; r < problem.rows.size(); r++) {
+		square[problem.rows[r].output] += residual[Index(r)] * residual[Index(r)];
+		count[problem.rows[r].output]++;
 	}
-	return status;
+	const double spent = double(problem.slots.size()) / double(problem.rows.size());
+	for (size_t o = 0; o < problem.output_count; o++)
+		if (problem.outputs[o])
+			result[o] = spent < 1 ? problem.output_scale[o] * std::sqrt(square[o] / (count[o] * (1 - spent))) : NAN;
+}
+
+/* ---- putting it together
+ * ---------------------------------------------------------------------------------------------- */
+
+/* Linear parameters that left their bounds become nonlinear ones, which Ceres keeps inside; true if there were any. */
+bool demote(Solver &solver, Structure &structure)
+{
+	bool any = false;
+	for (size_t j : structure.linear) {
+		Slot &s = solver.problem.slots[j];
+		const double value = solver.best[Index(j)], inside = std::fmin(std::fmax(value, s.lower), s.upper);
+		if (inside == value)
+			continue;
+		structure.never_linear[j] = 1;
+		any = true;
+	}
+	return any;
+}
+
+/* A static curve's parameters from every so many-th sample: the full recording then needs a step or two. */
+void start_from(ForwardProblem &probe, const Structure &structure, ForwardProblem &full)
+{
+	Solver coarse(probe, structure);
+	if (!structure.nonlinear.empty() && coarse.minimise() == TACTUS_OK)
+		for (size_t j : structure.nonlinear)
+			full.slots[j].start = coarse.best[Index(j)];
+}
+
+int solve(ForwardProblem &full, ForwardProblem &probe, double *noise)
+{
+	Structure structure;
+	structure.never_linear.assign(full.slots.size(), 0);
+	for (int attempt = 0; attempt < 8; attempt++) {
+		Explorer(probe, structure).explore();
+		if (&probe != &full && full.memoryless())
+			start_from(probe, structure, full);
+		Solver solver(full, structure);
+		const int status = solver.minimise();
+		if (status != TACTUS_OK)
+			return status;
+		if (demote(solver, structure))
+			continue;
+		if (solver.confirmed()) {
+			full.store(solver.best, standard_errors(solver));
+			residual_std(full, solver.residual, noise);
+			for (size_t j = 0; j < full.slots.size(); j++)
+				full.slots[j].start = solver.best[Index(j)];
+			return TACTUS_OK;
+		}
+		/* What was kept changed after all, or what seemed affine is not: first do without the one, then the other. */
+		if (!structure.may_keep)
+			std::fill(structure.never_linear.begin(), structure.never_linear.end(), 1);
+		structure.may_keep = false;
+	}
+	return tactus_fail(TACTUS_ERR_CONVERGENCE, "the fit found no parameters within their bounds");
+}
+
+/* The next number that no small period divides: what comes in turn (dc and ac rows, say) is then sampled evenly. */
+size_t odd_stride(size_t stride)
+{
+	while (stride > 1 && (stride % 2 == 0 || stride % 3 == 0 || stride % 5 == 0 || stride % 7 == 0))
+		stride++;
+	return stride;
+}
+
+int fit(const tactus_series *series, const tactus_effect *const *effects, size_t effect_count,
+		const double *const *weight, bool refit, tactus_model_channel_data *data)
+{
+	ForwardProblem full(series, effects, effect_count, weight, data, 1);
+	int status = full.prepare(refit);
+	if (status != TACTUS_OK)
+		return status;
+	if (full.rows.size() <= full.slots.size())
+		return tactus_fail(TACTUS_ERR_DATA, "%zu readings are too few for %zu parameters", full.rows.size(),
+						   full.slots.size());
+	ForwardProblem thin(series, effects, effect_count, weight, data, odd_stride(series->n / probe_samples + 1));
+	const bool use_thin =
+		series->n > 4 * probe_samples && thin.prepare(refit) == TACTUS_OK && thin.rows.size() > 4 * thin.slots.size();
+	ForwardProblem &probe = use_thin ? thin : full;
+	status = solve(full, probe, data->residual_std);
+	bool several = false;
+	for (size_t o = 1; o < full.output_count; o++)
+		several = several || (full.outputs[0] && full.outputs[o]);
+	if (status != TACTUS_OK || !several || effect_count == 0)
+		return status;
+	/* Each output by its own noise, once: what one output says well must not drown in the other's. */
+	for (size_t o = 0; o < full.output_count; o++)
+		if (full.outputs[o] && data->residual_std[o] > 1e-9 * full.output_scale[o])
+			full.set_scale(o, data->residual_std[o]);
+	probe.slots = full.slots;
+	return solve(full, probe, data->residual_std);
 }
 
 } // namespace
@@ -689,8 +555,7 @@ extern "C" int tactus_forward_fit(const tactus_series *series, const tactus_effe
 {
 	try {
 		tactus_silence_glog();
-		Fit fit(series, effects, effect_count, weight, channel);
-		return fit.run(refit);
+		return fit(series, effects, effect_count, weight, refit, channel);
 	} catch (const std::bad_alloc &) {
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	} catch (const std::exception &error) {

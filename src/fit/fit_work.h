@@ -4,6 +4,10 @@
 
 #include "fit/fit_internal.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* What to fit: a form with its effects, on some outputs. */
 typedef struct {
 	enum tactus_form form;
@@ -56,5 +60,9 @@ double tactus_combination_bound(const double *first, const double *second, const
 size_t tactus_output_signal(const tactus_domain *domain, size_t o);
 /* The first signal with this role; SIZE_MAX if there is none. */
 size_t tactus_role_signal(const tactus_domain *domain, enum tactus_role role);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

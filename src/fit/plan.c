@@ -181,7 +181,7 @@ static place *places(const tactus_work *work)
 			at[work->series[c].row[i]] = (place){c, i, SIZE_MAX};
 		for (size_t p = 0; p < points->n; p++)
 			for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++)
-				if (points->sample[o][p] != SIZE_MAX && isfinite(points->reading[o][p]))
+				if (points->sample[o] && points->sample[o][p] != SIZE_MAX && isfinite(points->reading[o][p]))
 					at[work->series[c].row[points->sample[o][p]]].point = p;
 	}
 	return at;
@@ -200,10 +200,10 @@ static tactus_sample sample_of(const tactus_work *work, const place *at, const d
 	tactus_sample sample = {.channel = s->channel};
 	sample.time_s = signal_at(s, SENSOR_TIME, i, NAN);
 	sample.conductance_S = sample.capacitance_F = sample.conductance_std_S = sample.capacitance_std_F = NAN;
-	if (at->point != SIZE_MAX && points->sample[0][at->point] == i)
-		sample.conductance_S = points->reading[0][at->point];
-	if (at->point != SIZE_MAX && points->sample[1][at->point] == i)
-		sample.capacitance_F = points->reading[1][at->point];
+	double *const value[] = {&sample.conductance_S, &sample.capacitance_F};
+	for (size_t o = 0; o < TACTUS_COUNT(value); o++)
+		if (at->point != SIZE_MAX && points->sample[o] && points->sample[o][at->point] == i)
+			*value[o] = points->reading[o][at->point];
 	sample.drive_V = signal_at(s, SENSOR_DRIVE, i, NAN);
 	sample.frequency_Hz = signal_at(s, SENSOR_FREQUENCY, i, NAN);
 	sample.temperature_degC = signal_at(s, SENSOR_TEMPERATURE, i, NAN);
@@ -307,7 +307,7 @@ static double *missing(size_t n)
 	return values;
 }
 
-static int outcomes_new(const tactus_work *work, tactus_outcome *outcome)
+static int outcomes_new(const tactus_work *work, const tactus_plan *plan, tactus_outcome *outcome)
 {
 	for (size_t c = 0; c < work->count; c++) {
 		size_t n = work->points[c].n;
@@ -316,6 +316,8 @@ static int outcomes_new(const tactus_work *work, tactus_outcome *outcome)
 		outcome[c].cv_estimate_N = missing(n);
 		bool ok = outcome[c].estimate_N && outcome[c].reference_N && outcome[c].cv_estimate_N;
 		for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
+			if (!plan->outputs[o])
+				continue;
 			outcome[c].residual[o] = missing(n);
 			outcome[c].cv_residual[o] = missing(n);
 			ok = ok && outcome[c].residual[o] && outcome[c].cv_residual[o];
@@ -372,7 +374,9 @@ int tactus_plan_run(const tactus_work *work, const tactus_plan *plan, tactus_mod
 	size_t slots = 1 + (size_t)work->fold_count;
 	run r = {.work = work, .plan = plan, .problem = problem, .outcome = outcome};
 	r.status = calloc(slots * work->count, sizeof *r.status);
-	int status = r.status ? outcomes_new(work, outcome) : TACTUS_ERR_MEMORY;
+	int status = r.status ? TACTUS_OK : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	if (status == TACTUS_OK && !work->parameters_only)
+		status = outcomes_new(work, plan, outcome);
 	for (size_t slot = 0; slot < slots && status == TACTUS_OK; slot++) {
 		r.model[slot] = empty_model(work, plan);
 		status = r.model[slot] ? TACTUS_OK : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");

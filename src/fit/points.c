@@ -43,12 +43,15 @@ static double *numbers(size_t n, double fill)
 	return values;
 }
 
-static bool allocate(tactus_points *points, size_t n)
+static bool allocate(const tactus_series *series, tactus_points *points)
 {
+	size_t n = series->n;
 	points->time_s = numbers(n, NAN);
 	points->input = numbers(n, NAN);
 	bool ok = points->time_s && points->input;
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
+		if (!has_output(series, o))
+			continue;
 		points->reading[o] = numbers(n, NAN);
 		points->weight[o] = numbers(n, 0);
 		points->sample[o] = malloc((n ? n : 1) * sizeof *points->sample[o]);
@@ -126,8 +129,10 @@ static void fill(const tactus_series *series, const double *sequence, const unsi
 			points->n++;
 		size_t p = points->n - 1, loads = 0;
 		for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
+			if (!values[o])
+				continue;
 			loads += points->sample[o][p] != SIZE_MAX;
-			if (!values[o] || isnan(values[o][i]))
+			if (isnan(values[o][i]))
 				continue;
 			points->sample[o][p] = i;
 			if (flags[i] & unusable) {
@@ -149,7 +154,7 @@ static void fill(const tactus_series *series, const double *sequence, const unsi
 int tactus_points_new(const tactus_series *series, const tactus_table *recording, tactus_points *points)
 {
 	unsigned *flags = calloc(series->n ? series->n : 1, sizeof *flags);
-	if (!flags || !allocate(points, series->n)) {
+	if (!flags || !allocate(series, points)) {
 		free(flags);
 		tactus_points_free(points);
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");

@@ -1,0 +1,167 @@
+/* The chain of one channel as a function of its fitted parameters: rows, parameters, ranges, one run. */
+#include "fit/forward_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/core.h"
+#include "fit/fit_work.h"
+
+namespace tactus
+{
+
+bool fitted(const tactus_parameter &parameter, const bool *outputs)
+{
+	return parameter.kind != TACTUS_CONSTANT && (parameter.output < 0 || outputs[parameter.output]);
+}
+
+ForwardProblem::ForwardProblem(const tactus_series *s, const tactus_effect *const *e, size_t count,
+							   const double *const *w, tactus_model_channel_data *d, size_t stride)
+	: series(s), effects(e, e + count), data(d), samples((s->n + stride - 1) / stride), step(stride)
+{
+	const tactus_domain *domain = s->domain;
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX && tactus_output_signal(domain, o) != SIZE_MAX; o++) {
+		output_signal[o] = tactus_output_signal(domain, o);
+		weight[o] = w[o];
+		outputs[o] = w[o] && s->signal[output_signal[o]];
+		predicted.emplace_back(outputs[o] ? samples : 0);
+		output_count = o + 1;
+	}
+	const size_t input = tactus_role_signal(domain, TACTUS_ROLE_INPUT);
+	if (s->signal[input])
+		input_range = tactus_series_maximum(s, int(input)) - tactus_series_minimum(s, int(input));
+	std::copy_n(s->signal, TACTUS_SIGNALS_MAX, signal);
+	if (stride > 1)
+		thin(stride);
+	for (size_t o = 0; o < output_count; o++)
+		signal[output_signal[o]] = outputs[o] ? predicted[o].data() : nullptr;
+}
+
+void ForwardProblem::thin(size_t stride)
+{
+	for (size_t i = 0; i < series->domain->signal_count; i++) {
+		if (!series->signal[i] || series->domain->signals[i].role == TACTUS_ROLE_OUTPUT)
+			continue;
+		std::vector<double> kept;
+		for (size_t k = 0; k < series->n; k += stride)
+			kept.push_back(series->signal[i][k]);
+		owned.push_back(std::move(kept));
+		signal[i] = owned.back().data();
+	}
+}
+
+int ForwardProblem::prepare(bool refit)
+{
+	for (size_t o = 0; o < output_count; o++) {
+		if (!outputs[o])
+			continue;
+		const double *y = series->signal[output_signal[o]];
+		double low = INFINITY, high = -INFINITY, mean = 0, square = 0, n = 0;
+		for (size_t i = 0; i < series->n; i += step) {
+			if (!(weight[o][i] > 0) || !std::isfinite(y[i]))
+				continue;
+			rows.push_back({o, i / step, std::sqrt(weight[o][i]), 0});
+			low = std::fmin(low, y[i]);
+			high = std::fmax(high, y[i]);
+			const double from = y[i] - mean;
+			mean += from / ++n;
+			square += from * (y[i] - mean);
+		}
+		if (!(square > 0))
+			return tactus_fail(TACTUS_ERR_DATA, "%s never changes", series->output_name[o]);
+		output_range[o] = high - low;
+		output_scale[o] = std::sqrt(square / n);
+	}
+	measured.resize(Eigen::Index(rows.size()));
+	for (size_t o = 0; o < output_count; o++)
+		set_scale(o, output_scale[o]);
+	for (size_t i = 0; i < series->domain->base_count; i++)
+		add_slot(-1, i, series->domain->base[i], data->base[i], refit);
+	for (size_t k = 0; k < effects.size(); k++)
+		for (size_t i = 0; i < effects[k]->parameter_count; i++)
+			add_slot(long(k), i, effects[k]->parameters[i], data->effect[k][i], refit);
+	const double *parameters[TACTUS_EFFECTS_MAX];
+	for (size_t k = 0; k < effects.size(); k++)
+		parameters[k] = data->effect[k];
+	tactus_chain *made = nullptr;
+	const int status = tactus_chain_new(series->domain, data->base, effects.data(), parameters, effects.size(), &made);
+	chain.reset(made);
+	return status;
+}
+
+void ForwardProblem::set_scale(size_t output, double scale)
+{
+	output_scale[output] = scale;
+	for (size_t r = 0; r < rows.size(); r++) {
+		if (rows[r].output != output)
+			continue;
+		rows[r].factor = rows[r].weight / scale;
+		measured[Eigen::Index(r)] = series->signal[output_signal[output]][rows[r].sample * step] * rows[r].factor;
+	}
+}
+
+/* Ranges in a unit such as "output0/N": start and scale of a parameter are stated for a range of 1 (engine.h). */
+double ForwardProblem::unit_range(const std::string &unit) const
+{
+	auto range = [&](const std::string &word) {
+		if (word == "N" && input_range > 0)
+			return input_range;
+		for (size_t o = 0; o < output_count; o++)
+			if (word == "output" + std::to_string(o) && output_range[o] > 0)
+				return output_range[o];
+		return 1.0;
+	};
+	const size_t slash = unit.find('/');
+	return range(unit.substr(0, slash)) / (slash == std::string::npos ? 1 : range(unit.substr(slash + 1)));
+}
+
+/* What is fitted, where it starts; a constant is stated for the range of these data unless the model states it. */
+void ForwardProblem::add_slot(long effect, size_t index, const tactus_parameter &info, double &value, bool refit)
+{
+	const double unit = unit_range(info.unit);
+	double start = refit && std::isfinite(value) ? value : info.start * unit;
+	start = std::fmin(std::fmax(start, info.lower), info.upper);
+	if (info.kind == TACTUS_CONSTANT)
+		value = start;
+	else if (fitted(info, outputs))
+		slots.push_back({effect, index, &info, start, info.scale * unit, info.lower, info.upper});
+}
+
+bool ForwardProblem::simulate(const VectorXd &values, VectorXd &y)
+{
+	double base[TACTUS_PARAMETERS_MAX], parameters[TACTUS_EFFECTS_MAX][TACTUS_PARAMETERS_MAX];
+	std::copy_n(data->base, series->domain->base_count, base);
+	for (size_t k = 0; k < effects.size(); k++)
+		std::copy_n(data->effect[k], effects[k]->parameter_count, parameters[k]);
+	for (size_t j = 0; j < slots.size(); j++)
+		(slots[j].effect < 0 ? base : parameters[slots[j].effect])[slots[j].index] = values[Eigen::Index(j)];
+	tactus_chain_set(chain.get(), -1, base);
+	for (size_t k = 0; k < effects.size(); k++)
+		tactus_chain_set(chain.get(), long(k), parameters[k]);
+	tactus_chain_reset(chain.get());
+	if (tactus_chain_run(chain.get(), samples, signal) != TACTUS_OK)
+		return false;
+	y.resize(Eigen::Index(rows.size()));
+	for (size_t r = 0; r < rows.size(); r++)
+		y[Eigen::Index(r)] = predicted[rows[r].output][rows[r].sample] * rows[r].factor;
+	return y.allFinite();
+}
+
+bool ForwardProblem::memoryless() const
+{
+	return std::all_of(effects.begin(), effects.end(), [](const tactus_effect *effect) {
+		return effect->state_size == 0 && !(effect->flags & TACTUS_EFFECT_LOOKAHEAD);
+	});
+}
+
+void ForwardProblem::store(const VectorXd &values, const VectorXd &errors)
+{
+	for (size_t j = 0; j < slots.size(); j++) {
+		const Slot &s = slots[j];
+		const auto at = Eigen::Index(j);
+		(s.effect < 0 ? data->base : data->effect[s.effect])[s.index] = values[at];
+		(s.effect < 0 ? data->base_std : data->effect_std[s.effect])[s.index] = errors[at];
+	}
+}
+
+} // namespace tactus
