@@ -6,7 +6,10 @@
 #include "core/core.h"
 #include "model/engine.h"
 
-enum { CHUNK = 512 }; /* samples that are worked on at a time: the signals of a domain then stay in the L1/L2 cache */
+enum {
+	CHUNK = 512, /* samples that are worked on at a time: the signals of a domain then stay in the cache */
+	PAD = 8      /* between columns, so that their first samples do not compete for one set of cache lines */
+};
 
 typedef struct {
 	const tactus_effect *effect;
@@ -23,6 +26,9 @@ struct tactus_chain {
 	double *scratch; /* signal_count columns of `capacity` samples */
 	size_t capacity;
 	double *work[TACTUS_SIGNALS_MAX];
+	double fill[TACTUS_SIGNALS_MAX]; /* the domain's, close at hand */
+	bool reads[TACTUS_SIGNALS_MAX];  /* signals that the caller may give */
+	bool looks_ahead;                /* an active effect does */
 	size_t count;
 	link links[];
 };
@@ -53,14 +59,14 @@ static int reserve(tactus_chain *chain, size_t n)
 {
 	if (n <= chain->capacity)
 		return TACTUS_OK;
-	double *scratch = malloc(chain->domain->signal_count * n * sizeof *scratch);
+	double *scratch = malloc(chain->domain->signal_count * (n + PAD) * sizeof *scratch);
 	if (scratch == NULL)
 		return tactus_fail(TACTUS_ERR_MEMORY, "no memory for a block of %zu samples", n);
 	free(chain->scratch);
 	chain->scratch = scratch;
 	chain->capacity = n;
 	for (size_t s = 0; s < chain->domain->signal_count; s++)
-		chain->work[s] = scratch + s * n;
+		chain->work[s] = scratch + s * (n + PAD);
 	return TACTUS_OK;
 }
 
@@ -96,6 +102,11 @@ int tactus_chain_new(const tactus_domain *domain, const double *base, const tact
 		return tactus_fail(TACTUS_ERR_MEMORY, "no memory for a chain of %zu effects", count);
 	chain->domain = domain;
 	chain->count = count;
+	for (size_t s = 0; s < domain->signal_count; s++) {
+		enum tactus_role role = domain->signals[s].role;
+		chain->fill[s] = domain->signals[s].fill;
+		chain->reads[s] = role != TACTUS_ROLE_INTERNAL && role != TACTUS_ROLE_OUTPUT;
+	}
 	tactus_chain_set(chain, -1, base);
 	status = fill_links(chain, effects, parameters);
 	if (status == TACTUS_OK)
@@ -127,6 +138,10 @@ void tactus_chain_set(tactus_chain *chain, long effect, const double *parameters
 	link *l = &chain->links[effect];
 	memcpy(l->parameters, parameters, l->effect->parameter_count * sizeof *parameters);
 	l->active = !tactus_effect_neutral(l->effect, parameters);
+	chain->looks_ahead = false;
+	for (size_t k = 0; k < chain->count; k++)
+		if (chain->links[k].active && (chain->links[k].effect->flags & TACTUS_EFFECT_LOOKAHEAD) != 0)
+			chain->looks_ahead = true;
 }
 
 void tactus_chain_reset(tactus_chain *chain)
@@ -136,27 +151,28 @@ void tactus_chain_reset(tactus_chain *chain)
 			chain->links[k].effect->reset(chain->links[k].parameters, chain->links[k].state);
 }
 
-static bool looks_ahead(const tactus_chain *chain)
-{
-	for (size_t k = 0; k < chain->count; k++)
-		if (chain->links[k].active && (chain->links[k].effect->flags & TACTUS_EFFECT_LOOKAHEAD) != 0)
-			return true;
-	return false;
-}
-
 /* Copies what is read into the scratch columns and sets the rest to its fill. */
 static void load(tactus_chain *chain, size_t first, size_t n, double *const *signal)
 {
 	for (size_t s = 0; s < chain->domain->signal_count; s++) {
-		const tactus_signal *kind = &chain->domain->signals[s];
+		bool given = chain->reads[s] && signal[s] != NULL;
 		double *to = chain->work[s];
-		bool given = kind->role != TACTUS_ROLE_INTERNAL && kind->role != TACTUS_ROLE_OUTPUT && signal[s] != NULL;
-		if (given)
+		if (n == 1) /* a live reading: not worth a call of memcpy() */
+			*to = given ? signal[s][first] : chain->fill[s];
+		else if (given)
 			memcpy(to, signal[s] + first, n * sizeof *to);
 		else
 			for (size_t i = 0; i < n; i++)
-				to[i] = kind->fill;
+				to[i] = chain->fill[s];
 	}
+}
+
+static void store(const tactus_chain *chain, size_t first, size_t n, double *const *signal)
+{
+	for (size_t s = 0; s < chain->domain->signal_count; s++)
+		if (chain->domain->signals[s].role == TACTUS_ROLE_OUTPUT && signal[s] != NULL)
+			for (size_t i = 0; i < n; i++)
+				signal[s][first + i] = chain->work[s][i];
 }
 
 static void compute(tactus_chain *chain, size_t n)
@@ -176,7 +192,7 @@ static void compute(tactus_chain *chain, size_t n)
 
 int tactus_chain_run(tactus_chain *chain, size_t n, double *const *signal)
 {
-	size_t chunk = looks_ahead(chain) ? n : CHUNK;
+	size_t chunk = chain->looks_ahead ? n : CHUNK;
 	int status = reserve(chain, chunk);
 	if (status < 0)
 		return status;
@@ -184,9 +200,7 @@ int tactus_chain_run(tactus_chain *chain, size_t n, double *const *signal)
 		size_t m = n - first < chunk ? n - first : chunk;
 		load(chain, first, m, signal);
 		compute(chain, m);
-		for (size_t s = 0; s < chain->domain->signal_count; s++)
-			if (chain->domain->signals[s].role == TACTUS_ROLE_OUTPUT && signal[s] != NULL)
-				memcpy(signal[s] + first, chain->work[s], m * sizeof(double));
+		store(chain, first, m, signal);
 	}
 	return TACTUS_OK;
 }

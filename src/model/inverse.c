@@ -338,10 +338,6 @@ static tactus_inverse_result solve_output(tactus_inverse *inverse, reading_model
 		result.quality = TACTUS_QUALITY_ILL_CONDITIONED;
 		return result;
 	}
-	if (!isfinite(forward(inverse, output, inverse->last))) {
-		result.quality = TACTUS_QUALITY_MISSING;
-		return result;
-	}
 	if (in_dead_zone(inverse, output, reading, sigma)) {
 		result = interval(inverse, output, reading, sigma);
 	} else {
@@ -350,6 +346,10 @@ static tactus_inverse_result solve_output(tactus_inverse *inverse, reading_model
 			result.std = root_std(inverse, output, result.force, reading, sigma, &result.quality);
 	}
 	if (isnan(result.force)) {
+		if (!isfinite(forward(inverse, output, inverse->last))) { /* a covariate that an effect needs */
+			result.quality = TACTUS_QUALITY_MISSING;
+			return result;
+		}
 		result.quality |= TACTUS_QUALITY_SATURATED;
 		result.memory = inverse->calibrated_high;
 	}
