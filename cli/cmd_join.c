@@ -8,13 +8,13 @@ static void report(const struct cli *cli, const tactus_join_options *options, co
 				   size_t rows)
 {
 	if (isnan(options->offset_s))
-		cli_note(cli, "the reference's clock + %.6g s ± %.2g s is the scan's (correlation %.4f)", result->offset_s,
-				 result->offset_std_s, result->correlation);
+		cli_note(cli, "offset %.6g s ± %.2g s, to be added to the reference's time (correlation %.4f)",
+				 result->offset_s, result->offset_std_s, result->correlation);
 	if (options->drift)
 		cli_note(cli, "the reference's clock gains %.3g ± %.2g s per second of the scan", result->drift,
 				 result->drift_std);
 	if (!isnan(result->rival_offset_s))
-		cli_note(cli, "%.6g s fits nearly as well (is the load periodic?); --offset or --max-offset decides",
+		cli_note(cli, "offset %.6g s fits nearly as well (is the load periodic?); --offset or --max-offset decides",
 				 result->rival_offset_s);
 	cli_note(cli, "%zu of %zu rows have a reference", result->matched, rows);
 }

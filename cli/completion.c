@@ -57,7 +57,7 @@ void cli_completion_bash(FILE *out)
 		  "\tlocal uri=$word\n"
 		  "\t[[ $word == : ]] && uri=\"$previous:\"\n"
 		  "\t[[ $previous == : ]] && uri=\"${COMP_WORDS[COMP_CWORD - 2]}:$word\"\n"
-		  "\tmapfile -t COMPREPLY < <(compgen -W \"$(tactus devices --uris 2>/dev/null) replay:\" -- \"$uri\")\n"
+		  "\tmapfile -t COMPREPLY < <(compgen -W \"$(tactus devices 2>/dev/null | cut -d' ' -f1) replay:\" -- \"$uri\")\n"
 		  "\tCOMPREPLY=(\"${COMPREPLY[@]#\"${uri%\"${uri##*:}\"}\"}\")\n"
 		  "\t[[ $uri == replay:* || ${#COMPREPLY[@]} -eq 0 ]] && word=${uri#*:} && _tactus_files\n"
 		  "\tcompopt -o nospace 2>/dev/null\n"

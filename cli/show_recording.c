@@ -40,6 +40,7 @@ struct clock {
 
 struct recording {
 	tactus_table *block;
+	const tactus_domain *domain; /* NULL: its columns do not tell */
 	size_t rows;
 	struct column *columns;
 	size_t column_count;
@@ -175,6 +176,8 @@ static int add_block(struct recording *recording, const tactus_table *block)
 			add_numbers(column, tactus_table_numbers(block, column->name), n);
 	}
 	recording->rows += n;
+	if (!recording->domain && n)
+		recording->domain = tactus_domain_of(block);
 	const double *channel = tactus_table_numbers(block, "channel");
 	int error = channel ? add_channels(recording, channel, n) : 0;
 	return error ? error
@@ -246,12 +249,6 @@ static struct rhythm find_rhythm(struct clock *clock)
 /* ---- text
  * ------------------------------------------------------------------------------------------------------------ */
 
-static const char *domain_of(const struct recording *recording)
-{
-	const tactus_domain *domain = tactus_domain_of(recording->block);
-	return domain ? tactus_domain_name(domain) : NULL;
-}
-
 static void print_columns(const struct recording *recording)
 {
 	printf("\n%-26s %10s %10s %14s %14s\n", "column", "values", "missing", "minimum", "maximum");
@@ -284,9 +281,11 @@ static void print_clock(const struct clock *clock, const struct rhythm *rhythm)
 
 static void print_recording(const struct recording *recording, const struct rhythm *rhythm, const char *file)
 {
-	const char *domain = domain_of(recording);
 	printf("%s: recording, %zu rows, ", strcmp(file, "-") ? file : "standard input", recording->rows);
-	printf(domain ? "domain %s\n" : "no domain that its columns tell\n", domain);
+	if (recording->domain)
+		printf("domain %s\n", tactus_domain_name(recording->domain));
+	else
+		puts("its columns do not say which domain");
 	if (recording->channel_count) {
 		fputs("channels:", stdout);
 		for (size_t c = 0; c < recording->channel_count; c++)
@@ -299,7 +298,7 @@ static void print_recording(const struct recording *recording, const struct rhyt
 	if (tactus_metadata_count(metadata))
 		puts("\nmetadata");
 	for (size_t i = 0; i < tactus_metadata_count(metadata); i++)
-		printf("  %-24s %s\n", tactus_metadata_key(metadata, i), tactus_metadata_value(metadata, i));
+		printf("  %-28s %s\n", tactus_metadata_key(metadata, i), tactus_metadata_value(metadata, i));
 }
 
 /* ---- JSON
@@ -349,7 +348,7 @@ static int json_recording(const struct recording *recording, const struct rhythm
 	struct cli_json *json = cli_json_begin();
 	cli_json_string(json, "kind", "recording");
 	cli_json_string(json, "file", file);
-	cli_json_string(json, "domain", domain_of(recording));
+	cli_json_string(json, "domain", recording->domain ? tactus_domain_name(recording->domain) : NULL);
 	cli_json_number(json, "rows", (double)recording->rows);
 	cli_json_array(json, "channels");
 	for (size_t c = 0; c < recording->channel_count; c++) {
