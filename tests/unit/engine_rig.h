@@ -17,6 +17,7 @@
 #include <tactus/error.h>
 #include <tactus/readout.h>
 
+#include "core/core.h"
 #include "core/random.h"
 #include "model/effects/effects.h"
 #include "model/model.h"
