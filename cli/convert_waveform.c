@@ -74,6 +74,7 @@ static int begin(struct waveform *w)
 	int error = tactus_demodulator_new(&w->how, &w->demodulator);
 	if (!error)
 		error = (int)tactus_demodulator_add(w->demodulator, 0, NULL, NULL, NULL, w->readings);
+	tactus_table_remove(w->readings, "quality"); /* the converter puts it where the contract has it: last */
 	if (!error)
 		error = tactus_converter_new(w->readings, &options, &w->converter);
 	if (!error)

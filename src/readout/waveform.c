@@ -284,16 +284,22 @@ static int put_number(const struct tactus_demodulator *d, tactus_table *table, c
 	return column ? 0 : TACTUS_ERR_MEMORY;
 }
 
-static int put_texts(const struct tactus_demodulator *d, tactus_table *table)
+static int put_mode(const struct tactus_demodulator *d, tactus_table *table)
+{
+	tactus_text *mode = tactus_table_set_texts(table, "mode");
+
+	for (size_t i = 0; mode && i < d->count; i++)
+		mode[i] = (tactus_text){"ac", 2};
+	return mode ? 0 : TACTUS_ERR_MEMORY;
+}
+
+static int put_quality(const struct tactus_demodulator *d, tactus_table *table)
 {
 	tactus_text *quality = tactus_table_set_texts(table, "quality");
 
 	for (size_t i = 0; quality && i < d->count; i++)
 		quality[i] = tactus_quality_name(d->readings[i].quality);
-	tactus_text *mode = quality ? tactus_table_set_texts(table, "mode") : NULL;
-	for (size_t i = 0; mode && i < d->count; i++)
-		mode[i] = (tactus_text){"ac", 2};
-	return mode ? 0 : TACTUS_ERR_MEMORY;
+	return quality ? 0 : TACTUS_ERR_MEMORY;
 }
 
 static long put_readings(struct tactus_demodulator *d, tactus_table *table)
@@ -317,10 +323,13 @@ static long put_readings(struct tactus_demodulator *d, tactus_table *table)
 
 	if (!error)
 		error = tactus_table_resize(table, d->count);
-	for (size_t i = 0; !error && i < TACTUS_COUNT(numbers); i++)
+	for (size_t i = 0; !error && i < TACTUS_COUNT(numbers); i++) {
 		error = put_number(d, table, numbers[i].name, numbers[i].member);
+		if (!error && numbers[i].member == offsetof(struct reading, channel))
+			error = put_mode(d, table);
+	}
 	if (!error)
-		error = put_texts(d, table);
+		error = put_quality(d, table);
 	long count = (long)d->count;
 	d->count = 0;
 	return error ? error : count;
