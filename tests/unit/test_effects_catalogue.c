@@ -254,7 +254,7 @@ static double mark(const tactus_effect *effect, bool frozen)
 			p[i] *= 1e-11;
 	}
 	for (size_t s = 0; s < SENSOR_SIGNALS; s++)
-		for (size_t i = 0; frozen && marked_by(effect, s) && i < rig.n; i++)
+		for (size_t i = 0; frozen && rig.signal[s] && marked_by(effect, s) && i < rig.n; i++)
 			rig.signal[s][i] = s == SENSOR_DRIVE ? 0 : 2.5;
 	rig_run(&rig, effect, p, rig.n);
 	double left = left_by_a_line(rig.signal[SENSOR_FORCE], rig.signal[SENSOR_G], rig.n);

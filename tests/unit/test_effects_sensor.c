@@ -128,9 +128,7 @@ static void steps_change_offset_and_gain_from_their_instants_on(void **unused)
 	const tactus_effect *effect = &tactus_effect_sensor_step_change;
 	double p[TACTUS_PARAMETERS_MAX];
 	rig_neutral(effect, p);
-	rig_recording bare = rig_record(domain, N);
-	double first = bare.signal[SENSOR_TIME][200], second = bare.signal[SENSOR_TIME][400];
-	rig_free(&bare);
+	double first = rig_value(domain, SENSOR_TIME, 200), second = rig_value(domain, SENSOR_TIME, 400);
 	rig_set(effect, p, "time_2_s", first);
 	rig_set(effect, p, "conductance_offset_2_S", 1e-6);
 	rig_set(effect, p, "capacitance_gain_2", 0.1);
