@@ -116,7 +116,7 @@ static void drift_is_a_power_of_time_per_output(void **unused)
 	rig_set(effect, p, "reference_time_s", 25);
 	rig_recording rig = through_chain(effect, p);
 	for (size_t i = 0; i < N; i++) {
-		double grown = sqrt(rig.signal[SENSOR_TIME][i]) / 5;
+		double grown = sqrt(rig_value(domain, SENSOR_TIME, i)) / 5;
 		expect(&rig, i, 2e-6 * grown, 1 - 0.1 * grown, -1e-12 * grown, 1 + 0.2 * grown);
 	}
 	rig_free(&rig);
@@ -156,7 +156,7 @@ static void temperature_changes_gain_and_offset_linearly(void **unused)
 	rig_set(effect, p, "reference_degC", 20);
 	rig_recording rig = through_chain(effect, p);
 	for (size_t i = 0; i < N; i++) {
-		double rise = rig.signal[SENSOR_TEMPERATURE][i] - 20;
+		double rise = rig_value(domain, SENSOR_TEMPERATURE, i) - 20;
 		expect(&rig, i, 1e-8 * rise, 1 + 0.003 * rise, -2e-13 * rise, 1 - 0.001 * rise);
 	}
 	rig_free(&rig);
@@ -173,8 +173,8 @@ static void voltage_dependence_is_that_of_the_fundamental_in_ac(void **unused)
 	rig_set(effect, p, "reference_V", v0);
 	rig_recording rig = through_chain(effect, p);
 	for (size_t i = 0; i < N; i++) {
-		double v = rig.signal[SENSOR_DRIVE][i], gain = 0;
-		if (rig.signal[SENSOR_FREQUENCY][i] > 0) {
+		double v = rig_value(domain, SENSOR_DRIVE, i), gain = 0;
+		if (rig_value(domain, SENSOR_FREQUENCY, i) > 0) {
 			for (int m = 0; m < 64; m++) { /* exact for a polynomial of the third order */
 				double s = sin(2 * rig_pi * m / 64), u = v * s;
 				gain += 2 * s * s * (1 + k * (u * u - v0 * v0)) / 64;
