@@ -22,15 +22,23 @@ using Eigen::Index;
 
 const size_t probe_samples = 4096; /* what decides on the structure of a longer recording */
 
-/* Upper triangle R of QR = rows, taken up in chunks that stay in the cache. */
-MatrixXd triangle(const MatrixXd &rows)
+using Columns = Eigen::Ref<const MatrixXd>;
+
+/* Upper triangle R of QR = [parts side by side], taken up in chunks that stay in the cache. */
+MatrixXd triangle(std::initializer_list<Columns> parts)
 {
-	const Index n = rows.cols(), chunk = 512;
+	const Index chunk = 512, rows = parts.begin()->rows();
+	Index n = 0;
+	for (const Columns &part : parts)
+		n += part.cols();
 	MatrixXd stack = MatrixXd::Zero(n + chunk, n);
-	VectorXd scratch(n), tau(n);
-	for (Index at = 0; at < rows.rows(); at += chunk) {
-		const Index m = std::min(chunk, rows.rows() - at);
-		stack.middleRows(n, m) = rows.middleRows(at, m);
+	for (Index at = 0; at < rows; at += chunk) {
+		const Index m = std::min(chunk, rows - at);
+		Index column = 0;
+		for (const Columns &part : parts) {
+			stack.block(n, column, m, part.cols()) = part.middleRows(at, m);
+			column += part.cols();
+		}
 		stack.bottomRows(chunk - m).setZero();
 		Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(stack);
 		stack.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
@@ -148,7 +156,7 @@ class Explorer
 				return false;
 			all.col(Index(c)) = y;
 		}
-		const MatrixXd r = triangle(all);
+		const MatrixXd r = triangle({all});
 		return std::abs(r(r.rows() - 1, r.cols() - 1)) > 1e-9 * r.col(r.cols() - 1).norm();
 	}
 
@@ -234,20 +242,19 @@ bool Solver::eliminate(VectorXd &values)
 	VectorXd now(Index(structure.nonlinear.size()));
 	for (size_t k = 0; k < structure.nonlinear.size(); k++)
 		now[Index(k)] = values[Index(structure.nonlinear[k])];
-	if (last.size() != now.size() || residual.size() == 0 || last != now) {
-		residual.resize(0);
+	if (last.size() != now.size() || last_beta.size() != l || last != now) {
+		last.resize(0);
 		if (!columns(values)) {
 			phi.resize(0, 0);
 			return false;
 		}
-		MatrixXd augmented(phi.rows(), l + 1);
-		augmented << phi, problem.measured - rest;
-		const MatrixXd r = triangle(augmented);
+		residual = problem.measured - rest;
+		const MatrixXd r = triangle({phi, residual});
 		const VectorXd diagonal = r.diagonal().head(l).cwiseAbs();
 		if (l && !(diagonal.minCoeff() > 1e-12 * diagonal.maxCoeff()))
 			return false;
 		last_beta = r.topLeftCorner(l, l).triangularView<Eigen::Upper>().solve(r.col(l).head(l));
-		residual = augmented.col(l) - phi * last_beta;
+		residual.noalias() -= phi * last_beta;
 		last = now;
 	}
 	for (Index c = 0; c < l; c++)
@@ -304,9 +311,7 @@ class Projected : public ceres::CostFunction
 		MatrixXd d;
 		if (!solver->derivatives(values, d))
 			return false;
-		MatrixXd all(solver->residual.size(), l + k + 1);
-		all << solver->phi, d, solver->residual;
-		const MatrixXd r = triangle(all);
+		const MatrixXd r = triangle({solver->phi, d, solver->residual});
 		out = r.block(l, l + k, k + 1, 1);
 		Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> j(jacobians[0], k + 1, k);
 		j = -r.block(l, l, k + 1, k);
@@ -406,7 +411,7 @@ VectorXd standard_errors(Solver &solver)
 	}
 	Eigen::ColPivHouseholderQR<MatrixXd> qr;
 	qr.setThreshold(1e-9);
-	qr.compute(triangle(all));
+	qr.compute(triangle({all}));
 	const Index rank = qr.rank();
 	const MatrixXd inverse =
 		qr.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>().solve(MatrixXd::Identity(rank, rank));
