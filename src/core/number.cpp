@@ -1,4 +1,5 @@
 // Numbers and their text, the same in every locale: shortest round-trip output, strict input.
+#include <cfloat>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -27,6 +28,35 @@ bool is_underflow(const char *digits, const char *end)
 	while (digits < end && *digits == '0')
 		digits++;
 	return digits == end || *digits == '.';
+}
+
+// Short decimals without an exponent: digits and power of ten are both exact, so one division rounds correctly
+// (Clinger 1990). False if the text is not that short or not a number.
+bool parse_short(const char *text, size_t length, double *value)
+{
+	constexpr double powers[] = {1e0, 1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,
+								 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17};
+	constexpr size_t length_max = 17;
+	if (FLT_EVAL_METHOD != 0 || length > length_max)
+		return false;
+	uint64_t mantissa = 0;
+	size_t digits = 0, point = length;
+	for (size_t i = length > 0 && text[0] == '-'; i < length; i++) {
+		unsigned digit = static_cast<unsigned char>(text[i]) - unsigned{'0'};
+		if (digit < 10) {
+			mantissa = 10 * mantissa + digit;
+			digits++;
+		} else if (text[i] == '.' && point == length) {
+			point = i + 1;
+		} else {
+			return false;
+		}
+	}
+	if (digits == 0 || mantissa > static_cast<uint64_t>(largest_exact_integer))
+		return false;
+	double magnitude = static_cast<double>(mantissa) / powers[length - point];
+	*value = text[0] == '-' ? -magnitude : magnitude;
+	return true;
 }
 
 } // namespace
@@ -64,6 +94,8 @@ extern "C" size_t tactus_number_prefix(const char *text, size_t length, double *
 
 extern "C" bool tactus_parse_number(const char *text, size_t length, double *value)
 {
+	if (parse_short(text, length, value))
+		return true;
 	double parsed;
 	if (length == 0 || tactus_number_prefix(text, length, &parsed) != length)
 		return false;

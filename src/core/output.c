@@ -20,6 +20,11 @@ static int fail_errno(const struct tactus_output *output, const char *what, int 
 	return tactus_fail(TACTUS_ERR_OUTPUT, "%s: %s: %s", output->name, what, strerror(error));
 }
 
+int tactus_output_fail(const struct tactus_output *output, int code)
+{
+	return fail_errno(output, "cannot be written", code);
+}
+
 /* ---- opening ---- */
 
 /* A file that does not exist yet, beside path; its name in output->beside. */
@@ -93,28 +98,39 @@ int tactus_output_open(const char *path, unsigned flags, struct tactus_output *o
 
 /* ---- writing ---- */
 
-static int write_all(struct tactus_output *output, const char *bytes, size_t length)
+int tactus_output_write(int fd, const char *bytes, size_t length)
 {
-	if (output->truncate && ftruncate(output->fd, 0) != 0)
-		return fail_errno(output, "cannot be written", errno);
-	output->truncate = false;
 	while (length > 0) {
-		ssize_t n = write(output->fd, bytes, length);
+		ssize_t n = write(fd, bytes, length);
 		if (n < 0 && errno == EAGAIN)
-			poll(&(struct pollfd){.fd = output->fd, .events = POLLOUT}, 1, -1);
+			poll(&(struct pollfd){.fd = fd, .events = POLLOUT}, 1, -1);
 		else if (n < 0 && errno != EINTR)
-			return fail_errno(output, "cannot be written", errno);
+			return errno;
 		bytes += n > 0 ? n : 0;
 		length -= n > 0 ? (size_t)n : 0;
 	}
+	return 0;
+}
+
+static int empty_old_file(struct tactus_output *output)
+{
+	if (output->truncate && ftruncate(output->fd, 0) != 0)
+		return tactus_output_fail(output, errno);
+	output->truncate = false;
 	return TACTUS_OK;
 }
 
 int tactus_output_flush(struct tactus_output *output)
 {
 	size_t used = output->used;
+	if (used == 0)
+		return TACTUS_OK;
 	output->used = 0;
-	return used > 0 ? write_all(output, output->buffer, used) : TACTUS_OK;
+	int error = empty_old_file(output);
+	if (error)
+		return error;
+	int code = tactus_output_write(output->fd, output->buffer, used);
+	return code ? tactus_output_fail(output, code) : TACTUS_OK;
 }
 
 char *tactus_output_room(struct tactus_output *output, size_t length, int *error)
@@ -174,9 +190,9 @@ int tactus_output_close(struct tactus_output *output)
 {
 	int error = tactus_output_flush(output);
 	if (!error && output->truncate && output->path)
-		error = write_all(output, "", 0); /* an empty recording is written all the same */
+		error = empty_old_file(output); /* an empty recording is written all the same */
 	if (output->path && close(output->fd) != 0 && !error)
-		error = fail_errno(output, "cannot be written", errno);
+		error = tactus_output_fail(output, errno);
 	output->fd = -1;
 	if (!error && output->beside)
 		error = rename_into_place(output);

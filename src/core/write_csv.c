@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "core/core.h"
+#include "core/write_rows.h"
 #include "core/writer.h"
 
 /* ---- text ---- */
@@ -178,10 +179,6 @@ int tactus_write_csv_rows(tactus_writer *writer, tactus_table *table)
 	writer->part_count = 0;
 	for (size_t c = 0; !error && c < table->column_count; c++)
 		error = make_part(writer, table, &table->columns[c]);
-	for (size_t row = 0; !error && row < table->rows; row++) {
-		char *to = tactus_output_room(&writer->output, row_bound(writer, table, row), &error);
-		if (to)
-			writer->output.used = (size_t)(put_row(to, writer, table, row) - writer->output.buffer);
-	}
-	return error;
+	static const struct tactus_row_format format = {row_bound, put_row};
+	return error ? error : tactus_rows_write(writer, &format, table);
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/core.h"
+#include "core/write_rows.h"
 #include "core/writer.h"
 
 /* ---- values ---- */
@@ -235,10 +236,6 @@ static char *put_row(char *to, const tactus_writer *writer, const tactus_table *
 int tactus_write_json_rows(tactus_writer *writer, tactus_table *table)
 {
 	int error = make_parts(writer, table);
-	for (size_t row = 0; !error && row < table->rows; row++) {
-		char *to = tactus_output_room(&writer->output, row_bound(writer, table, row), &error);
-		if (to)
-			writer->output.used = (size_t)(put_row(to, writer, table, row) - writer->output.buffer);
-	}
-	return error;
+	static const struct tactus_row_format format = {row_bound, put_row};
+	return error ? error : tactus_rows_write(writer, &format, table);
 }

@@ -6,6 +6,7 @@
 #include "core/core.h"
 #include "core/reader.h"
 #include "core/table.h"
+#include "core/write_rows.h"
 #include "core/writer.h"
 
 int tactus_writer_open(const char *path, enum tactus_format format, unsigned flags, tactus_writer **writer)
@@ -25,6 +26,7 @@ int tactus_writer_open(const char *path, enum tactus_format format, unsigned fla
 
 static void free_writer(tactus_writer *writer)
 {
+	tactus_rows_free(writer);
 	for (size_t c = 0; c < writer->column_count; c++) {
 		free(writer->names[c]);
 		if (writer->keys)
@@ -39,12 +41,17 @@ static void free_writer(tactus_writer *writer)
 
 int tactus_writer_flush(tactus_writer *writer)
 {
-	return tactus_output_flush(&writer->output);
+	int error = tactus_rows_settle(writer);
+	return error ? error : tactus_output_flush(&writer->output);
 }
 
 int tactus_writer_close(tactus_writer *writer)
 {
-	int error = tactus_output_close(&writer->output);
+	int error = tactus_writer_flush(writer);
+	if (error)
+		tactus_output_abort(&writer->output);
+	else
+		error = tactus_output_close(&writer->output);
 	free_writer(writer);
 	return error;
 }
@@ -53,6 +60,7 @@ void tactus_writer_abort(tactus_writer *writer)
 {
 	if (!writer)
 		return;
+	tactus_rows_free(writer); /* before the file is closed under its hands */
 	tactus_output_abort(&writer->output);
 	free_writer(writer);
 }

@@ -23,6 +23,7 @@ struct tactus_writer {
 	size_t *key_lengths;
 	struct tactus_part *parts; /* of the present block, at most one per column */
 	size_t part_count;
+	struct tactus_row_writer *rows; /* the second thread, once there was a block worth it */
 };
 
 int tactus_put(tactus_writer *writer, const char *text, size_t length);

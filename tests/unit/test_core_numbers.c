@@ -70,6 +70,26 @@ static void numbers_have_their_shortest_text(void **state)
 	}
 }
 
+/* Short decimals take a shorter way: it must lead to the same double as the C library's. */
+static void short_decimals_are_read_correctly_rounded(void **state)
+{
+	(void)state;
+	uint64_t seed = 2;
+	for (int i = 0; i < 300000; i++) {
+		char text[40];
+		uint64_t bits = next_random(&seed), digits = next_random(&seed) >> (bits % 60);
+		int length = snprintf(text, sizeof text, "%s%llu", bits >> 63 ? "-" : "", (unsigned long long)digits);
+		int point = (int)(bits >> 8 & 31);
+		if (point <= length && !(point == 0 && text[0] == '-')) {
+			memmove(text + point + 1, text + point, (size_t)(length - point) + 1);
+			text[point] = '.';
+		}
+		double value, same = strtod(text, NULL);
+		assert_true(tactus_parse_number(text, strlen(text), &value));
+		assert_memory_equal(&value, &same, sizeof value);
+	}
+}
+
 static void what_is_no_finite_number_is_refused(void **state)
 {
 	(void)state;
@@ -193,6 +213,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(any_double_survives_its_text),
 		cmocka_unit_test(numbers_have_their_shortest_text),
+		cmocka_unit_test(short_decimals_are_read_correctly_rounded),
 		cmocka_unit_test(what_is_no_finite_number_is_refused),
 		cmocka_unit_test(a_number_of_any_length_is_in_range_or_refused),
 		cmocka_unit_test(a_locale_with_a_decimal_comma_changes_nothing),

@@ -99,6 +99,39 @@ static void computed_columns_stand_beside_the_lines(void **state)
 	core_expect_file("calc.csv", "a_N,b_N,c_N,mode,d_N,quality\n1.0,0.125,3.0,dc,,ok\n4.0,0.5,6.0,ac,,ok\n");
 }
 
+/* Large tables are formatted by two threads: the rows come out in order, whatever the sizes of the blocks. */
+static void tables_of_any_size_are_written_in_order(void **state)
+{
+	(void)state;
+	const size_t sizes[] = {1, 511, 512, 2048, 2049, 10000, 3, 5000};
+	tactus_table *table = tactus_table_new(), *back;
+	tactus_writer *writer;
+	size_t total = 0;
+	assert_int_equal(tactus_writer_open("large.csv", TACTUS_FORMAT_CSV, 0, &writer), 0);
+	for (size_t s = 0; s < TACTUS_COUNT(sizes); s++) {
+		assert_int_equal(tactus_table_resize(table, sizes[s]), 0);
+		double *sequence = tactus_table_set_numbers(table, "sequence"),
+			   *force = tactus_table_set_numbers(table, "force_N");
+		for (size_t r = 0; r < sizes[s]; r++, total++) {
+			sequence[r] = (double)total;
+			force[r] = (double)total / 3;
+		}
+		assert_int_equal(tactus_writer_rows(writer, table), 0);
+		for (size_t r = 0; r < sizes[s]; r++)
+			sequence[r] = -1; /* the table is the caller's again */
+		if (s == 3)
+			assert_int_equal(tactus_writer_flush(writer), 0);
+	}
+	assert_int_equal(tactus_writer_close(writer), 0);
+	assert_int_equal(tactus_table_read("large.csv", NULL, &back), 0);
+	assert_int_equal(tactus_table_rows(back), total);
+	const double *sequence = tactus_table_numbers(back, "sequence"), *force = tactus_table_numbers(back, "force_N");
+	for (size_t r = 0; r < total; r++)
+		assert_true(sequence[r] == (double)r && force[r] == (double)r / 3);
+	tactus_table_free(back);
+	tactus_table_free(table);
+}
+
 static void a_single_column_keeps_its_missing_values(void **state)
 {
 	(void)state;
@@ -342,6 +375,7 @@ int main(void)
 		cmocka_unit_test(numbers_of_csv_that_json_does_not_know_are_rewritten),
 		cmocka_unit_test(texts_of_the_caller_are_quoted_where_they_must),
 		cmocka_unit_test(computed_columns_stand_beside_the_lines),
+		cmocka_unit_test(tables_of_any_size_are_written_in_order),
 		cmocka_unit_test(a_single_column_keeps_its_missing_values),
 		cmocka_unit_test(a_file_appears_whole_or_not_at_all),
 		cmocka_unit_test(an_existing_file_is_replaced_only_if_asked),
