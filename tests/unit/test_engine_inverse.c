@@ -280,6 +280,29 @@ static void above_the_asymptote_there_is_no_force(void **unused)
 	tactus_model_free(model);
 }
 
+/* While it saturates the memory takes the load for the largest calibrated one: exact if that is what it is. */
+static void while_saturated_the_memory_is_fed_the_end_of_the_range(void **unused)
+{
+	(void)unused;
+	tactus_model *model = rig_model("G", 1);
+	rig_effect(model, &tactus_effect_sensor_saturation, true);
+	rig_effect(model, &tactus_effect_sensor_creep, true);
+	tactus_table *table = rig_recording(60, 1, "");
+	double *load = (double *)tactus_table_numbers(table, "force_N");
+	for (size_t i = 0; i < 60; i++)
+		load[i] = i < 10 ? 2 : rig_range_N;
+	rig_simulate(model, 0, table);
+	double *reading = (double *)tactus_table_numbers(table, "conductance_S");
+	for (size_t i = 10; i < 40; i++)
+		reading[i] *= 100;
+	rig_estimate(model, table);
+	assert_int_equal(missing(table, "force_estimate_N"), 30);
+	for (size_t i = 40; i < 60; i++)
+		rig_near(tactus_table_numbers(table, "force_estimate_N")[i], rig_range_N, 1e-8);
+	tactus_table_free(table);
+	tactus_model_free(model);
+}
+
 static void outside_the_calibrated_range_it_says_so(void **unused)
 {
 	(void)unused;
@@ -353,6 +376,7 @@ int main(void)
 		cmocka_unit_test(the_larger_of_residual_and_reading_uncertainty_counts),
 		cmocka_unit_test(below_a_dead_zone_there_is_an_interval),
 		cmocka_unit_test(above_the_asymptote_there_is_no_force),
+		cmocka_unit_test(while_saturated_the_memory_is_fed_the_end_of_the_range),
 		cmocka_unit_test(outside_the_calibrated_range_it_says_so),
 		cmocka_unit_test(outside_the_calibrated_readings_it_says_so),
 		cmocka_unit_test(a_reading_that_does_not_depend_on_the_load_has_no_force),

@@ -107,7 +107,7 @@ static void conductance_comes_from_dc_rows_and_capacitance_from_ac_rows(void **u
 	double *std = rig_column(table, "conductance_std_S");
 	for (size_t r = 0; r < 24; r++) {
 		g[r] = std[r] = (double)r;
-		c[r] = r % 2 ? (double)r : NAN; /* dc rows have none */
+		c[r] = r % 2 ? (double)r : -1; /* what a dc row says of it does not count */
 	}
 	tactus_series *series;
 	size_t count;
@@ -257,6 +257,23 @@ static void neighbours_loads_are_interpolated_in_time(void **unused)
 	tactus_table_free(table);
 }
 
+/* Two logs put one after the other: the rows of a channel are not in the order of time. */
+static void neighbours_are_found_in_any_order_of_rows(void **unused)
+{
+	(void)unused;
+	tactus_table *table = columns_of(8, "time_s channel force_N conductance_S");
+	memcpy(values_of(table, "channel"), (double[]){1, 1, 1, 1, 2, 2, 2, 2}, 8 * sizeof(double));
+	memcpy(values_of(table, "time_s"), (double[]){1.5, 2.5, 0.5, 0.25, 2, 3, 0, 1}, 8 * sizeof(double));
+	memcpy(values_of(table, "force_N"), (double[]){0, 0, 0, 0, 20, 30, 0, 10}, 8 * sizeof(double));
+	tactus_series *series;
+	size_t count;
+	rig_ok(tactus_series_split(table, NULL, &series, &count));
+	for (size_t i = 0; i < 4; i++)
+		rig_near(series[0].signal[SENSOR_FORCE_ABOVE][i], 10 * series[0].signal[SENSOR_TIME][i], 1e-12);
+	tactus_series_free(series, count);
+	tactus_table_free(table);
+}
+
 static void without_a_clock_neighbours_are_those_of_the_same_scan(void **unused)
 {
 	(void)unused;
@@ -313,6 +330,7 @@ int main(void)
 		cmocka_unit_test(rows_that_cannot_be_used_are_said),
 		cmocka_unit_test(any_column_can_play_input_and_output),
 		cmocka_unit_test(neighbours_loads_are_interpolated_in_time),
+		cmocka_unit_test(neighbours_are_found_in_any_order_of_rows),
 		cmocka_unit_test(without_a_clock_neighbours_are_those_of_the_same_scan),
 		cmocka_unit_test(measures_pass_over_what_is_missing),
 	};
