@@ -290,7 +290,7 @@ static void while_saturated_the_memory_is_fed_the_end_of_the_range(void **unused
 	tactus_table *table = rig_recording(60, 1, "");
 	double *load = (double *)tactus_table_numbers(table, "force_N");
 	for (size_t i = 0; i < 60; i++)
-		load[i] = i < 10 ? 2 : rig_range_N;
+		load[i] = i < 10 ? 2 : i < 40 ? rig_range_N : 3;
 	rig_simulate(model, 0, table);
 	double *reading = (double *)tactus_table_numbers(table, "conductance_S");
 	for (size_t i = 10; i < 40; i++)
@@ -298,7 +298,7 @@ static void while_saturated_the_memory_is_fed_the_end_of_the_range(void **unused
 	rig_estimate(model, table);
 	assert_int_equal(missing(table, "force_estimate_N"), 30);
 	for (size_t i = 40; i < 60; i++)
-		rig_near(tactus_table_numbers(table, "force_estimate_N")[i], rig_range_N, 1e-8);
+		rig_near(tactus_table_numbers(table, "force_estimate_N")[i], 3, 1e-8);
 	tactus_table_free(table);
 	tactus_model_free(model);
 }
