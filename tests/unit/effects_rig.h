@@ -119,21 +119,27 @@ static inline bool rig_is_given(const tactus_domain *domain, size_t s)
 typedef struct {
 	const tactus_domain *domain;
 	size_t n;
-	double *signal[TACTUS_SIGNALS_MAX]; /* NULL for internal ones */
+	double *signal[TACTUS_SIGNALS_MAX];
 } rig_recording;
 
 static inline rig_recording rig_record(const tactus_domain *domain, size_t n)
 {
 	rig_recording rig = {.domain = domain, .n = n};
 	for (size_t s = 0; s < domain->signal_count; s++) {
-		if (domain->signals[s].role == TACTUS_ROLE_INTERNAL)
-			continue;
 		rig.signal[s] = malloc(n * sizeof(double));
 		assert_non_null(rig.signal[s]);
 		for (size_t i = 0; i < n; i++)
 			rig.signal[s][i] = rig_is_given(domain, s) ? rig_value(domain, s, i) : NAN;
 	}
 	return rig;
+}
+
+/* A column of a recording, which is there. */
+static inline double *rig_column(const rig_recording *rig, size_t s)
+{
+	if (!rig->signal[s])
+		abort();
+	return rig->signal[s];
 }
 
 static inline void rig_free(rig_recording *rig)
@@ -160,7 +166,7 @@ static inline void rig_run(rig_recording *rig, const tactus_effect *effect, cons
 	for (size_t i = 0; i < rig->n; i += block) {
 		double *signal[TACTUS_SIGNALS_MAX] = {0};
 		for (size_t s = 0; s < rig->domain->signal_count; s++)
-			signal[s] = rig->signal[s] ? rig->signal[s] + i : NULL;
+			signal[s] = rig->signal[s] + i;
 		assert_int_equal(tactus_chain_run(chain, rig->n - i < block ? rig->n - i : block, signal), 0);
 	}
 	tactus_chain_free(chain);
@@ -169,15 +175,6 @@ static inline void rig_run(rig_recording *rig, const tactus_effect *effect, cons
 static inline bool rig_is_output(const rig_recording *rig, size_t s)
 {
 	return rig->domain->signals[s].role == TACTUS_ROLE_OUTPUT;
-}
-
-/* A copy of the recording's k-th output signal; free it. */
-static inline double *rig_copy(const rig_recording *rig, size_t s)
-{
-	double *copy = malloc(rig->n * sizeof(double));
-	assert_non_null(copy);
-	memcpy(copy, rig->signal[s], rig->n * sizeof(double));
-	return copy;
 }
 
 #endif

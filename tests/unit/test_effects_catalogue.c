@@ -171,8 +171,7 @@ static void blocks_of_any_size_give_the_same_bits(void **unused)
 static void remove_row(rig_recording *rig, size_t row)
 {
 	for (size_t s = 0; s < rig->domain->signal_count; s++)
-		if (rig->signal[s])
-			memmove(rig->signal[s] + row, rig->signal[s] + row + 1, (rig->n - row - 1) * sizeof(double));
+		memmove(rig->signal[s] + row, rig->signal[s] + row + 1, (rig->n - row - 1) * sizeof(double));
 	rig->n--;
 }
 
@@ -254,8 +253,8 @@ static double mark(const tactus_effect *effect, bool frozen)
 			p[i] *= 1e-11;
 	}
 	for (size_t s = 0; s < SENSOR_SIGNALS; s++)
-		for (size_t i = 0; frozen && rig.signal[s] && marked_by(effect, s) && i < rig.n; i++)
-			rig.signal[s][i] = s == SENSOR_DRIVE ? 0 : 2.5;
+		for (size_t i = 0; frozen && marked_by(effect, s) && i < rig.n; i++)
+			rig_column(&rig, s)[i] = s == SENSOR_DRIVE ? 0 : 2.5;
 	rig_run(&rig, effect, p, rig.n);
 	double left = left_by_a_line(rig.signal[SENSOR_FORCE], rig.signal[SENSOR_G], rig.n);
 	rig_free(&rig);

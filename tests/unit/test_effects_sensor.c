@@ -97,9 +97,9 @@ static rig_recording through_chain(const tactus_effect *effect, const double *p)
 /* Conductance and capacitance must be g0 + dg + g1 (1 + gg) F and the like. */
 static void expect(const rig_recording *rig, size_t i, double offset_g, double gain_g, double offset_c, double gain_c)
 {
-	double force = rig->signal[SENSOR_FORCE][i];
-	rig_near(rig->signal[SENSOR_G][i], 1e-6 + offset_g + 1e-5 * force * gain_g, 1e-18);
-	rig_near(rig->signal[SENSOR_C][i], 1.5e-10 + offset_c + 3e-12 * force * gain_c, 1e-23);
+	double force = rig_column(rig, SENSOR_FORCE)[i];
+	rig_near(rig_column(rig, SENSOR_G)[i], 1e-6 + offset_g + 1e-5 * force * gain_g, 1e-18);
+	rig_near(rig_column(rig, SENSOR_C)[i], 1.5e-10 + offset_c + 3e-12 * force * gain_c, 1e-23);
 }
 
 static void drift_is_a_power_of_time_per_output(void **unused)
