@@ -171,7 +171,9 @@ static int build(struct scan *scan)
 		return error;
 	tactus_model_fingerprint(scan->model, fingerprint);
 	error = tactus_metadata_set(tactus_table_metadata(scan->table), "model", fingerprint);
-	return error ? error : tactus_estimator_new(scan->model, &scan->estimator);
+	if (!error)
+		error = tactus_estimator_new(scan->model, &scan->estimator);
+	return error ? error : tactus_estimator_block(scan->estimator, scan->table); /* its columns, for the header */
 }
 
 static double *tare_of(const struct scan *scan, int channel)

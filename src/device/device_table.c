@@ -1,5 +1,7 @@
 /* Readings of a scan as a table in the contract's columns. */
 #include <math.h>
+#include <stddef.h>
+#include <string.h>
 
 #include "core/core.h"
 #include "device/device.h"
@@ -13,38 +15,6 @@ typedef struct {
 	tactus_detectors detectors;
 	int code;
 } job;
-
-typedef double getter(const job *j, const tactus_reading *reading);
-
-static double time_s(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return r->time_s;
-}
-
-static double sequence(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return (double)r->sequence;
-}
-
-static double channel(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return r->channel;
-}
-
-static double drive_V(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return r->drive_V;
-}
-
-static double frequency_Hz(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return r->frequency_Hz;
-}
 
 /* Volts at the amplifier's output: signed in DC, peak in AC. */
 static double amplitude_V(const job *j, const tactus_reading *r)
@@ -62,58 +32,45 @@ static double phase_rad(const job *j, const tactus_reading *r)
 	return tactus_detectors_phase(&j->detectors, r->detector_phase_V);
 }
 
-static double detector_amplitude_V(const job *j, const tactus_reading *r)
+typedef double getter(const job *j, const tactus_reading *reading);
+
+static double sequence(const job *j, const tactus_reading *r)
 {
 	(void)j;
-	return r->detector_amplitude_V;
+	return (double)r->sequence;
 }
 
-static double detector_phase_V(const job *j, const tactus_reading *r)
+static double channel(const job *j, const tactus_reading *r)
 {
 	(void)j;
-	return r->detector_phase_V;
+	return r->channel;
 }
 
-static double detector_dc_V(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return r->detector_dc_V;
-}
-
-static double force_N(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return r->force_N;
-}
-
-static double temperature_degC(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return r->temperature_degC;
-}
-
-static double reference_resistance_ohm(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return r->reference_resistance_ohm;
-}
-
-static double reference_capacitance_F(const job *j, const tactus_reading *r)
-{
-	(void)j;
-	return r->reference_capacitance_F;
-}
-
-static void put(job *j, bool wanted, const char *name, getter *get)
+static double *new_column(job *j, bool wanted, const char *name)
 {
 	if (!wanted || j->code < 0)
-		return;
+		return NULL;
 	double *column = tactus_table_set_numbers(j->table, name);
 	if (column == NULL && j->n > 0)
 		j->code = tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	return column;
+}
+
+static void put_computed(job *j, bool wanted, const char *name, getter *get)
+{
+	double *column = new_column(j, wanted, name);
 	for (size_t i = 0; i < j->n && column != NULL; i++)
 		column[i] = get(j, &j->readings[i]);
 }
+
+/* A column that is a field of the reading. */
+static void put_field(job *j, bool wanted, const char *name, size_t offset)
+{
+	double *column = new_column(j, wanted, name);
+	for (size_t i = 0; i < j->n && column != NULL; i++)
+		memcpy(&column[i], (const char *)&j->readings[i] + offset, sizeof(double));
+}
+#define PUT(j, wanted, field) put_field(j, wanted, #field, offsetof(tactus_reading, field))
 
 static void put_mode(job *j)
 {
@@ -141,21 +98,21 @@ int tactus_device_table(const tactus_device *device, const tactus_reading *readi
 		j.code = tactus_detectors_get(device->metadata, &j.detectors);
 	if (j.code >= 0)
 		j.code = tactus_table_resize(table, n);
-	put(&j, true, "time_s", time_s);
-	put(&j, true, "sequence", sequence);
-	put(&j, true, "channel", channel);
+	PUT(&j, true, time_s);
+	put_computed(&j, true, "sequence", sequence);
+	put_computed(&j, true, "channel", channel);
 	put_mode(&j);
-	put(&j, true, "drive_V", drive_V);
-	put(&j, true, "frequency_Hz", frequency_Hz);
-	put(&j, !raw, "amplitude_V", amplitude_V);
-	put(&j, !raw, "phase_rad", phase_rad);
-	put(&j, raw && (device->modes & TACTUS_MODE_AC) != 0, "detector_amplitude_V", detector_amplitude_V);
-	put(&j, raw && (device->modes & TACTUS_MODE_AC) != 0, "detector_phase_V", detector_phase_V);
-	put(&j, raw && (device->modes & TACTUS_MODE_DC) != 0, "detector_dc_V", detector_dc_V);
+	PUT(&j, true, drive_V);
+	PUT(&j, true, frequency_Hz);
+	put_computed(&j, !raw, "amplitude_V", amplitude_V);
+	put_computed(&j, !raw, "phase_rad", phase_rad);
+	PUT(&j, raw && (device->modes & TACTUS_MODE_AC) != 0, detector_amplitude_V);
+	PUT(&j, raw && (device->modes & TACTUS_MODE_AC) != 0, detector_phase_V);
+	PUT(&j, raw && (device->modes & TACTUS_MODE_DC) != 0, detector_dc_V);
 	put_quality(&j);
-	put(&j, device->has_force, "force_N", force_N);
-	put(&j, device->has_temperature, "temperature_degC", temperature_degC);
-	put(&j, device->has_reference, "reference_resistance_ohm", reference_resistance_ohm);
-	put(&j, device->has_reference, "reference_capacitance_F", reference_capacitance_F);
+	PUT(&j, device->has_force, force_N);
+	PUT(&j, device->has_temperature, temperature_degC);
+	PUT(&j, device->has_reference, reference_resistance_ohm);
+	PUT(&j, device->has_reference, reference_capacitance_F);
 	return j.code < 0 ? j.code : TACTUS_OK;
 }
