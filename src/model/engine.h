@@ -35,9 +35,9 @@ enum tactus_parameter_kind {
 typedef struct {
 	const char *name;
 	/*
-	 * "output0", "output1" where it has the unit of that output, "N" where it has the input's: start and scale are then
-	 * those for a range of 1, to be multiplied by the range ("1/N", "1/N/s": divided by it, "1/N2", "1/N2/s": by its
-	 * square). Likewise the start of a TACTUS_CONSTANT: the value to state for that range. Every other unit: as it is.
+	 * "output0", "output1" where it has the unit of that output, "N" where it has the input's, "1/N", "output0/N":
+	 * start and scale are then those for a range of 1, to be multiplied by the range (or divided by it). Likewise the
+	 * start of a TACTUS_CONSTANT: the value to state for that range. Every other unit ("1/N/s" too): as it is.
 	 */
 	const char *unit;
 	const char *summary;
