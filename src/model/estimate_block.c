@@ -22,7 +22,9 @@ static int check_readings(const tactus_estimator *estimator)
 		const char *name = estimator->model->output_name[o];
 		if (name == NULL)
 			continue;
-		if (columns->signal[columns->output_signal[o]] != NULL)
+		/* before the first row the type of a foreign column is not known: its name is enough */
+		if (columns->signal[columns->output_signal[o]] != NULL ||
+			(columns->rows == 0 && tactus_table_find(columns->table, name) >= 0))
 			any = true;
 		else if (missing == NULL)
 			missing = name;
