@@ -266,6 +266,9 @@ static void settings_come_from_option_column_metadata_in_this_order(void **state
 	assert_true(at(table, "drive_V", 1) == 8 && at(table, "frequency_Hz", 1) == 3000);
 	assert_string_equal(tactus_metadata_get(metadata, "drive_V"), "8");
 	assert_string_equal(tactus_metadata_get(metadata, "frequency_Hz"), "3000");
+	texts(table, "mode", 2, (const char *const[]){"dc", "ac"});
+	convert(table, &options);
+	assert_true(at(table, "frequency_Hz", 0) == 0 && at(table, "frequency_Hz", 1) == 3000);
 	tactus_table_free(table);
 }
 

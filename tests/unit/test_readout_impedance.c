@@ -195,6 +195,9 @@ static void what_cannot_be_computed_is_missing_and_flagged(void **state)
 	assert_true(isnan(open.resistance_ohm) && isnan(open.resistance_std_ohm) && open.conductance_S == 0);
 	rig_near(open.conductance_std_S, 1e-3 * cos(0.5) / 3000, 1e-12);
 	assert_int_equal(open.quality, TACTUS_QUALITY_ILL_CONDITIONED);
+	readout.amplitude_std_V = readout.phase_std_rad = 0;
+	assert_int_equal(tactus_readout_ac(&readout, 0, 0.5, 3, 4000).quality, TACTUS_QUALITY_ILL_CONDITIONED);
+	assert_int_equal(tactus_readout_dc(&readout, 0, 5).quality, TACTUS_QUALITY_ILL_CONDITIONED);
 	assert_true(isnan(no_frequency.capacitance_F) && isnan(no_frequency.capacitance_std_F));
 	rig_near(no_frequency.resistance_ohm, 3000 / cos(0.5), 1e-14);
 	assert_true(no_frequency.quality & TACTUS_QUALITY_MISSING);
