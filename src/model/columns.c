@@ -141,7 +141,7 @@ static bool fits(const tactus_table *table, const tactus_domain *domain, const t
 /* Why no domain fits: by the one whose first input is there, else by the first domain. */
 static void fail_domain(const tactus_table *table, const tactus_series_options *options)
 {
-	tactus_columns columns;
+	tactus_columns columns = {.table = table};
 	const tactus_domain *domain;
 	for (size_t i = 0; (domain = tactus_domain_at(i)) != NULL; i++) {
 		tactus_columns_of_domain(domain, &columns);

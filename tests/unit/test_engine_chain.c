@@ -101,7 +101,7 @@ static void blocks_of_any_size_give_the_same_bits(void **unused)
 	(void)unused;
 	const tactus_domain *domain;
 	for (size_t d = 0; (domain = tactus_domain_at(d)) != NULL; d++) {
-		double *signal[TACTUS_SIGNALS_MAX], *again[TACTUS_SIGNALS_MAX], *part[TACTUS_SIGNALS_MAX];
+		double *signal[TACTUS_SIGNALS_MAX], *again[TACTUS_SIGNALS_MAX] = {0}, *part[TACTUS_SIGNALS_MAX];
 		fill(domain, signal);
 		redirect(domain, signal, again);
 		tactus_chain *chain = chain_of(domain, true, TACTUS_EFFECT_LOOKAHEAD);

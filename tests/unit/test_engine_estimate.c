@@ -8,11 +8,12 @@ static double at(const tactus_table *table, const char *name, size_t row)
 	return values[row];
 }
 
-static void set_text(tactus_table *table, const char *name, const char *const *texts)
+static void set_quality(tactus_table *table, size_t n, const char *const *texts)
 {
-	tactus_text *column = tactus_table_set_texts(table, name);
+	tactus_text *column = tactus_table_set_texts(table, "quality");
 	assert_non_null(column);
-	for (size_t r = 0; r < tactus_table_rows(table); r++)
+	assert_int_equal(tactus_table_rows(table), n);
+	for (size_t r = 0; r < n; r++)
 		column[r] = (tactus_text){texts[r], strlen(texts[r])};
 }
 
@@ -166,7 +167,7 @@ static void flags_of_the_reading_are_kept_and_joined(void **unused)
 	tactus_table *table = rig_recording(5, 1, "");
 	((double *)tactus_table_numbers(table, "force_N"))[3] = 40;
 	rig_simulate(model, 0, table);
-	set_text(table, "quality", (const char *const[]){"ok", "folded", "", "ill-conditioned", "my own word"});
+	set_quality(table, 5, (const char *const[]){"ok", "folded", "", "ill-conditioned", "my own word"});
 	rig_estimate(model, table);
 	static const char *const expected[] = {"ok", "folded", "ok", "ill-conditioned+extrapolated", "my own word"};
 	for (size_t r = 0; r < 5; r++) {
@@ -185,7 +186,7 @@ static void a_clipped_reading_is_a_bound_and_no_estimate(void **unused)
 	tactus_model *model = rig_model("G", 1);
 	tactus_table *table = rig_recording(3, 1, "");
 	rig_simulate(model, 0, table);
-	set_text(table, "quality", (const char *const[]){"ok", "clipped", "ok"});
+	set_quality(table, 3, (const char *const[]){"ok", "clipped", "ok"});
 	rig_estimate(model, table);
 	assert_true(isnan(at(table, "force_estimate_N", 1)));
 	assert_int_equal(rig_quality(table, 1), TACTUS_QUALITY_CLIPPED);
@@ -343,7 +344,7 @@ static void a_pair_is_complete_in_its_second_row(void **unused)
 		c[r] = r % 2 ? rig_c0 + rig_c1 * 5 : NAN;
 	}
 	g[4] = NAN; /* of the third scan */
-	set_text(table, "quality", (const char *const[]){"ok", "ok", "folded", "ok", "ok", "ok", "ok", "ill-conditioned"});
+	set_quality(table, 8, (const char *const[]){"ok", "ok", "folded", "ok", "ok", "ok", "ok", "ill-conditioned"});
 	rig_estimate(model, table);
 	static const unsigned quality[] = {
 		0, 0, TACTUS_QUALITY_FOLDED,         TACTUS_QUALITY_FOLDED, TACTUS_QUALITY_MISSING,

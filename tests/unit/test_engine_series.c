@@ -231,10 +231,10 @@ static void neighbours_loads_are_interpolated_in_time(void **unused)
 	tactus_table *table = columns_of(3 * SCANS, "time_s sequence channel force_N conductance_S");
 	double *time_s = values_of(table, "time_s"), *force = values_of(table, "force_N");
 	for (size_t r = 0; r < 3 * SCANS; r++) {
-		size_t k = r % 3;
+		size_t k = r % 3, scan = r / 3;
 		values_of(table, "channel")[r] = (double)(5 - k); /* in any order */
-		values_of(table, "sequence")[r] = (double)(r / 3);
-		time_s[r] = (double)(r / 3) + 0.2 * (double)k;
+		values_of(table, "sequence")[r] = (double)scan;
+		time_s[r] = (double)scan + 0.2 * (double)k;
 		force[r] = (double)(5 - k) * time_s[r];
 	}
 	force[12] = NAN; /* a missing load is passed over */
@@ -279,7 +279,8 @@ static void without_a_clock_neighbours_are_those_of_the_same_scan(void **unused)
 	(void)unused;
 	tactus_table *table = columns_of(8, "sequence channel force_N conductance_S");
 	for (size_t r = 0; r < 8; r++) {
-		values_of(table, "sequence")[r] = (double)(r / 2);
+		size_t scan = r / 2;
+		values_of(table, "sequence")[r] = (double)scan;
 		values_of(table, "channel")[r] = (double)(r % 2 + 1);
 	}
 	tactus_series *series;
