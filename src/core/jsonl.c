@@ -111,7 +111,7 @@ int tactus_json_open(struct tactus_reader *reader)
 			return found;
 		if (is_blank_line(input))
 			continue;
-		json_t *object;
+		json_t *object = NULL;
 		int error = parse_line(input, &object);
 		if (error)
 			return error;
@@ -173,7 +173,7 @@ static int set_cells(struct tactus_reader *reader, json_t *record)
 /* The line at begin as rows: 1 if it was consumed, 0 if there is more of it, or an error. */
 static int read_record(struct tactus_reader *reader, size_t max_rows)
 {
-	json_t *object;
+	json_t *object = NULL;
 	if (is_blank_line(&reader->input))
 		return 1;
 	int result = parse_line(&reader->input, &object);

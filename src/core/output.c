@@ -208,7 +208,7 @@ void tactus_output_abort(struct tactus_output *output)
 		close(output->fd);
 	if (output->beside)
 		unlink(output->beside);
-	else if (output->created && output->truncate)
+	else if (output->path && output->created && output->truncate)
 		unlink(output->path); /* nothing was ever written */
 	free_output(output);
 }

@@ -17,10 +17,9 @@ static char *put_string(char *to, tactus_text text)
 	for (size_t i = 0; i < text.length; i++) {
 		unsigned char c = (unsigned char)text.text[i];
 		if (c < 0x20) {
-			memcpy(to, "\\u00", 4);
-			to[4] = hex[c >> 4];
-			to[5] = hex[c & 15];
-			to += 6;
+			to = stpcpy(to, "\\u00");
+			*to++ = hex[c >> 4];
+			*to++ = hex[c & 15];
 			continue;
 		}
 		if (c == '"' || c == '\\')
@@ -165,16 +164,13 @@ static char *put_field(char *to, const tactus_table *table, size_t row, size_t f
 	}
 	if (tactus_parse_number(text.text, text.length, &number))
 		return to + tactus_format_number(number, to);
-	memcpy(to, "null", 4);
-	return to + 4;
+	return stpcpy(to, "null");
 }
 
 static char *put_number(char *to, double number)
 {
 	size_t length = tactus_format_number(number, to);
-	if (length == 0)
-		memcpy(to, "null", length = 4);
-	return to + length;
+	return length > 0 ? to + length : stpcpy(to, "null");
 }
 
 static int make_parts(tactus_writer *writer, tactus_table *table)
