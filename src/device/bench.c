@@ -72,7 +72,7 @@ static const struct {
 	KEY(adc, sample_s, POSITIVE),
 	KEY(reference, noise_N, NOT_NEGATIVE),
 	KEY(reference, resolution_N, NOT_NEGATIVE),
-	KEY(reference, latency_s, NOT_NEGATIVE),
+	KEY(reference, latency_s, 0, 1),
 	SWITCH(reference, present),
 	KEY(temperature, base_degC, -273.15, INFINITY),
 	KEY(temperature, ramp_degC_per_s, ANY),

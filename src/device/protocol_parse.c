@@ -10,6 +10,8 @@
 
 enum { DEPTH_MAX = 16, STEPS_MAX = 100000, WORD_MAX = 64, VIEW_MAX = 160 };
 
+static const double DURATION_MAX_S = 1e10, LEVELS_MAX = 1e12;
+
 typedef struct {
 	const char *text;
 	size_t position;      /* of the character after the token */
@@ -180,6 +182,9 @@ static int append(parser *p, tactus_protocol_step step)
 		protocol->steps = steps;
 		protocol->capacity = capacity;
 	}
+	if (!(protocol->duration_s + step.duration_s < DURATION_MAX_S) ||
+		(step.time_s > 0 && step.duration_s > LEVELS_MAX * step.time_s))
+		return fail_at(p, "this step never ends");
 	step.start_s = protocol->duration_s;
 	step.number = protocol->count;
 	step.seed = p->seed;

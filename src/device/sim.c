@@ -288,7 +288,7 @@ static int set_metadata(const tactus_sim *sim, const tactus_scan_settings *setti
 		code =
 			code < 0 ? code : set_protocol(m, settings->protocol != NULL ? settings->protocol : sim->bench->protocol);
 	code = code < 0 ? code : tactus_metadata_set_number(m, "seed", (double)sim->seed);
-	return code < 0 ? code : sim_electronics_metadata(sim->bench, m);
+	return code < 0 ? code : sim_electronics_metadata(sim->bench, sim->modes, m);
 }
 
 static int sim_start(tactus_device *device, const tactus_scan_settings *settings)

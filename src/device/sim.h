@@ -105,6 +105,6 @@ double sim_window_s(const tactus_bench *bench, double frequency_Hz);
 /* From conductance and capacitance to detector volts, for readings in order; `position` counts channels in a scan. */
 int sim_electronics_run(sim_electronics *electronics, sim_block *block, size_t channel_count, size_t mode_count);
 /* Detectors, ADC and what is known of the circuit, as a recording says them. */
-int sim_electronics_metadata(const tactus_bench *bench, tactus_metadata *metadata);
+int sim_electronics_metadata(const tactus_bench *bench, unsigned modes, tactus_metadata *metadata);
 
 #endif

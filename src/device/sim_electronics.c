@@ -300,7 +300,7 @@ int sim_electronics_run(sim_electronics *e, sim_block *block, size_t channel_cou
 /* ---- what is known -------------------------------------------------------------------------------------------------
  */
 
-int sim_electronics_metadata(const tactus_bench *bench, tactus_metadata *metadata)
+int sim_electronics_metadata(const tactus_bench *bench, unsigned modes, tactus_metadata *metadata)
 {
 	const double step_V = adc_step_V(bench), top_V = bench->adc.maximum_V - step_V;
 	const double std_V = sqrt(step_V * step_V / 12 + bench->adc.noise_V * bench->adc.noise_V);
@@ -313,23 +313,26 @@ int sim_electronics_metadata(const tactus_bench *bench, tactus_metadata *metadat
 		.phase_inverted = bench->detectors.phase_inverted,
 		.dc_gain = bench->detectors.dc_gain,
 	};
+	const unsigned both = TACTUS_MODE_DC | TACTUS_MODE_AC;
 	const struct {
 		const char *key;
 		double value;
+		unsigned modes; /* that it is about */
 	} numbers[] = {
-		{"gain_resistor_ohm", bench->amplifier.gain_resistor_ohm},
-		{"switch_resistance_ohm", bench->switches.resistance_ohm},
-		{"lead_capacitance_F", bench->switches.lead_capacitance_F},
-		{"amplitude_std_V", std_V / gain},
-		{"amplitude_max_V", fmin(amplitude_max_V, bench->amplifier.maximum_V)},
-		{"phase_std_rad", std_V * pi / detectors.phase_supply_V},
-		{"dc_std_V", std_V / dc_gain},
-		{"dc_max_V", fmin(top_V / dc_gain, bench->amplifier.maximum_V)},
-		{"adc_bits", bench->adc.bits},
-		{"adc_range_V", bench->adc.maximum_V - bench->adc.minimum_V},
+		{"gain_resistor_ohm", bench->amplifier.gain_resistor_ohm, both},
+		{"switch_resistance_ohm", bench->switches.resistance_ohm, both},
+		{"lead_capacitance_F", bench->switches.lead_capacitance_F, TACTUS_MODE_AC},
+		{"amplitude_std_V", std_V / gain, TACTUS_MODE_AC},
+		{"amplitude_max_V", fmin(amplitude_max_V, bench->amplifier.maximum_V), TACTUS_MODE_AC},
+		{"phase_std_rad", std_V * pi / detectors.phase_supply_V, TACTUS_MODE_AC},
+		{"dc_std_V", std_V / dc_gain, TACTUS_MODE_DC},
+		{"dc_max_V", fmin(top_V / dc_gain, bench->amplifier.maximum_V), TACTUS_MODE_DC},
+		{"adc_bits", bench->adc.bits, both},
+		{"adc_range_V", bench->adc.maximum_V - bench->adc.minimum_V, both},
 	};
 	int code = TACTUS_OK;
 	for (size_t i = 0; i < TACTUS_COUNT(numbers) && code >= 0; i++)
-		code = tactus_metadata_set_number(metadata, numbers[i].key, numbers[i].value);
+		if ((numbers[i].modes & modes) != 0)
+			code = tactus_metadata_set_number(metadata, numbers[i].key, numbers[i].value);
 	return code < 0 ? code : tactus_detectors_set(&detectors, metadata);
 }

@@ -183,6 +183,12 @@ static void test_deep_and_long_protocols_are_refused_not_crashed_on(void **state
 	assert_non_null(strstr(tactus_error_message(), "parentheses"));
 	assert_int_equal(tactus_protocol_parse("repeat 1000 (repeat 1000 (rest 1s))", 1, &protocol), TACTUS_ERR_ARGUMENT);
 	assert_non_null(strstr(tactus_error_message(), "too many steps"));
+	static const char *const endless[] = {"staircase 0N..1e300N 1e-300N 1s", "random 0N..1N 1e-9s 1h", "hold 1N 1e300s",
+										  "repeat 9 (hold 1N 3e9s)"};
+	for (size_t i = 0; i < COUNT(endless); i++) {
+		assert_int_equal(tactus_protocol_parse(endless[i], 1, &protocol), TACTUS_ERR_ARGUMENT);
+		assert_non_null(strstr(tactus_error_message(), "never ends"));
+	}
 }
 
 int main(void)
