@@ -33,6 +33,9 @@ const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tact
 	return NULL;
 }
 
+/* What may follow "output0" in a parameter's unit. */
+static const char *const unit_tails[] = {"", "/N", "/degC"};
+
 const char *tactus_form_name(enum tactus_form form)
 {
 	return forms[form].name;
@@ -70,8 +73,9 @@ tactus_model *tactus_model_new(const tactus_domain *domain, enum tactus_form for
 	model->domain = domain;
 	model->form = form;
 	model->provenance = tactus_metadata_new();
-	if (!model->provenance) {
-		free(model);
+	model->unit_text = calloc((size_t)TACTUS_OUTPUTS_MAX * TACTUS_COUNT(unit_tails), sizeof *model->unit_text);
+	if (!model->provenance || !model->unit_text) {
+		tactus_model_free(model);
 		return NULL;
 	}
 	return model;
@@ -87,6 +91,7 @@ void tactus_model_free(tactus_model *model)
 		free(model->output_mode[o]);
 	}
 	free(model->channels);
+	free(model->unit_text);
 	tactus_metadata_free(model->provenance);
 	free(model);
 }
@@ -248,88 +253,96 @@ const char *tactus_model_unit(const tactus_model *model, const char *unit)
 {
 	if (strncmp(unit, "output", 6) != 0)
 		return unit;
-	size_t output = unit[6] == '1' ? 1 : 0;
+	size_t output = unit[6] == '1' ? 1 : 0, tail = 0;
+	while (tail + 1 < TACTUS_COUNT(unit_tails) && strcmp(unit + 7, unit_tails[tail]) != 0)
+		tail++;
 	const char *name = model->output_name[output];
 	if (!name)
 		name = tactus_domain_signal(model->domain, TACTUS_ROLE_OUTPUT, output)->name;
 	const char *suffix = strrchr(name, '_');
-	if (!suffix || unit[7] == '\0')
-		return suffix ? suffix + 1 : "";
-	/* "output0/N", a sensitivity: a foreign column's is left without a unit */
-	return strcmp(suffix, "_S") == 0 ? "S/N" : strcmp(suffix, "_F") == 0 ? "F/N" : "";
+	char *text = model->unit_text[output * TACTUS_COUNT(unit_tails) + tail];
+	snprintf(text, sizeof *model->unit_text, "%s%s", suffix ? suffix + 1 : "", unit_tails[tail]);
+	return text;
 }
 
-size_t tactus_model_parameters(const tactus_model *model, size_t channel_index)
+/* A parameter of an output that is not modelled is none of this model's. */
+bool tactus_model_has(const tactus_model *model, const tactus_parameter *parameter)
 {
-	if (channel_index >= model->channel_count)
-		return 0;
-	size_t n = tactus_form_has_base(model->form) ? model->domain->base_count : 0;
-	for (size_t k = 0; k < model->effect_count; k++)
-		n += model->effects[k]->parameter_count;
-	for (const char *const *p = forms[model->form].parameters; *p; p++)
-		n++;
-	return n;
+	return parameter->output < 0 || model->output_name[parameter->output];
 }
 
-/* Where the i-th parameter of the list lives; its description may be NULL (an estimator's). */
+/* One parameter of one channel; `info` is NULL where it is an estimator's. */
 struct place {
 	const tactus_parameter *info;
 	const char *effect, *name, *unit;
 	double *value, *std;
 };
 
-static struct place find_place(const tactus_model *model, size_t channel_index, size_t i)
+/* Counts *i down over the parameters of a table; true if it ended in it, with the place filled. */
+static bool step_through(const tactus_model *model, const char *effect, const tactus_parameter *table, size_t n,
+						 double *values, double *stds, size_t *i, struct place *place)
+{
+	for (size_t k = 0; k < n; k++)
+		if (tactus_model_has(model, &table[k]) && (*i)-- == 0) {
+			*place = (struct place){&table[k],  effect,  table[k].name, tactus_model_unit(model, table[k].unit),
+									&values[k], &stds[k]};
+			return true;
+		}
+	return false;
+}
+
+/* The i-th parameter of the list: base, effects, estimator. False past the last. */
+static bool find_place(const tactus_model *model, size_t channel_index, size_t i, struct place *place)
 {
 	tactus_model_channel_data *data = &model->channels[channel_index];
-	if (tactus_form_has_base(model->form)) {
-		if (i < model->domain->base_count) {
-			const tactus_parameter *p = &model->domain->base[i];
-			return (struct place){
-				p, "", p->name, tactus_model_unit(model, p->unit), &data->base[i], &data->base_std[i]};
-		}
-		i -= model->domain->base_count;
-	}
+	const tactus_domain *domain = model->domain;
+	if (tactus_form_has_base(model->form) &&
+		step_through(model, "", domain->base, domain->base_count, data->base, data->base_std, &i, place))
+		return true;
 	for (size_t k = 0; k < model->effect_count; k++) {
 		const tactus_effect *effect = model->effects[k];
-		if (i < effect->parameter_count) {
-			const tactus_parameter *p = &effect->parameters[i];
-			return (struct place){p,
-								  effect->name,
-								  p->name,
-								  tactus_model_unit(model, p->unit),
-								  &data->effect[k][i],
-								  &data->effect_std[k][i]};
-		}
-		i -= effect->parameter_count;
+		if (step_through(model, effect->name, effect->parameters, effect->parameter_count, data->effect[k],
+						 data->effect_std[k], &i, place))
+			return true;
 	}
-	return (struct place){NULL,
-						  "",
-						  forms[model->form].parameters[i],
-						  forms[model->form].units[i],
-						  &data->estimator[i],
-						  &data->estimator_std[i]};
+	const char *const *names = forms[model->form].parameters;
+	for (size_t k = 0; names[k]; k++)
+		if (i-- == 0) {
+			*place = (struct place){
+				NULL, "", names[k], forms[model->form].units[k], &data->estimator[k], &data->estimator_std[k]};
+			return true;
+		}
+	return false;
+}
+
+size_t tactus_model_parameters(const tactus_model *model, size_t channel_index)
+{
+	struct place place;
+	size_t n = 0;
+	while (channel_index < model->channel_count && find_place(model, channel_index, n, &place))
+		n++;
+	return n;
 }
 
 tactus_parameter_value tactus_model_parameter(const tactus_model *model, size_t channel_index, size_t i)
 {
-	if (i >= tactus_model_parameters(model, channel_index))
+	struct place at;
+	if (channel_index >= model->channel_count || !find_place(model, channel_index, i, &at))
 		return (tactus_parameter_value){"", "", "", NAN, NAN};
-	struct place at = find_place(model, channel_index, i);
 	return (tactus_parameter_value){at.effect, at.name, at.unit, *at.value, *at.std};
 }
 
 int tactus_model_set(tactus_model *model, size_t channel_index, const char *effect, const char *name, double value,
 					 double standard_error)
 {
+	struct place at;
 	if (channel_index >= model->channel_count)
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "the model has %zu channels, there is no index %zu",
 						   model->channel_count, channel_index);
-	size_t n = tactus_model_parameters(model, channel_index);
-	for (size_t i = 0; i < n; i++) {
-		struct place at = find_place(model, channel_index, i);
+	for (size_t i = 0; find_place(model, channel_index, i, &at); i++) {
 		if (strcmp(at.effect, effect ? effect : "") != 0 || strcmp(at.name, name) != 0)
 			continue;
-		if (at.info && (value < at.info->lower || value > at.info->upper))
+		if (at.info && !(value >= at.info->lower && value <= at.info->upper))
 			return tactus_fail(TACTUS_ERR_ARGUMENT, "%s must lie in %g to %g %s, %g does not", name, at.info->lower,
 							   at.info->upper, at.unit, value);
 		*at.value = value;

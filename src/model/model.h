@@ -44,6 +44,7 @@ struct tactus_model {
 	tactus_model_channel_data *channels;
 	size_t channel_count;
 	tactus_metadata *provenance;
+	char (*unit_text)[24]; /* what tactus_model_unit() returns pointers into */
 };
 
 /* A model without channels; every number NaN. NULL when memory runs out. */
@@ -58,6 +59,8 @@ tactus_model_channel_data *tactus_model_find_channel(const tactus_model *model, 
 int tactus_model_chain(const tactus_model *model, const tactus_model_channel_data *channel, tactus_chain **chain);
 /* The i-th signal of a role in a domain's table, NULL past the last: output 1, say. */
 const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tactus_role role, size_t i);
+/* False for a parameter of an output that the model does not have. */
+bool tactus_model_has(const tactus_model *model, const tactus_parameter *parameter);
 /* Names of an estimator's parameters, NULL-terminated. */
 const char *const *tactus_estimator_parameters(enum tactus_form form);
 const char *const *tactus_estimator_units(enum tactus_form form);
@@ -65,7 +68,7 @@ const char *const *tactus_estimator_units(enum tactus_form form);
 int tactus_form_find(const char *name);
 /* True if the form uses the domain's base equations. */
 bool tactus_form_has_base(enum tactus_form form);
-/* The unit that "output0" or "output1" stands for in this model; any other unit as it is. */
+/* The unit that "output0" or "output1/N" stands for in this model; any other unit as it is. Owned by the model. */
 const char *tactus_model_unit(const tactus_model *model, const char *unit);
 
 #ifdef __cplusplus

@@ -44,6 +44,8 @@ static int read_parameters(const tactus_model *model, const tactus_toml_node *ta
 						   size_t n, double *values, double *stds)
 {
 	for (size_t i = 0; i < n; i++) {
+		if (!tactus_model_has(model, &parameters[i]))
+			continue; /* reported as unknown if it is there */
 		int status = read_value(table, parameters[i].name, tactus_model_unit(model, parameters[i].unit), &parameters[i],
 								&values[i], &stds[i]);
 		if (status < 0)
@@ -132,7 +134,7 @@ static int missing_value(const tactus_model *model, const tactus_toml_node *node
 			return tactus_toml_fail(node, NULL, TACTUS_ERR_INPUT, "channel %d has no %s in [estimator]", data->channel,
 									names[i]);
 	for (size_t i = 0; tactus_form_has_base(model->form) && i < model->domain->base_count; i++)
-		if (isnan(data->base[i]))
+		if (tactus_model_has(model, &model->domain->base[i]) && isnan(data->base[i]))
 			return tactus_toml_fail(node, NULL, TACTUS_ERR_INPUT, "channel %d has no %s in [base]", data->channel,
 									model->domain->base[i].name);
 	return TACTUS_OK;

@@ -71,7 +71,8 @@ static void put_parameters(FILE *file, const tactus_model *model, const tactus_p
 						   const double *values, const double *stds)
 {
 	for (size_t i = 0; i < n; i++)
-		put_value(file, parameters[i].name, tactus_model_unit(model, parameters[i].unit), values[i], stds[i]);
+		if (tactus_model_has(model, &parameters[i]))
+			put_value(file, parameters[i].name, tactus_model_unit(model, parameters[i].unit), values[i], stds[i]);
 }
 
 static void put_channel(FILE *file, const tactus_model *model, const tactus_model_channel_data *data)

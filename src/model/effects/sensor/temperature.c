@@ -8,10 +8,10 @@ static const tactus_parameter parameters[] = {
 	 0.001, TACTUS_STRENGTH, 0},
 	{"capacitance_gain_per_degC", "1/degC", "temperature coefficient of the capacitance's sensitivity", 0, -1, 1, 0.002,
 	 0.001, TACTUS_STRENGTH, 1},
-	{"conductance_offset_S_per_degC", "output0", "change of the conductance's offset per degree", 0, -1e9, 1e9, 0.002,
-	 0.001, TACTUS_STRENGTH, 0},
-	{"capacitance_offset_F_per_degC", "output1", "change of the capacitance's offset per degree", 0, -1e9, 1e9, 0.002,
-	 0.001, TACTUS_STRENGTH, 1},
+	{"conductance_offset_S_per_degC", "output0/degC", "change of the conductance's offset per degree", 0, -1e9, 1e9,
+	 0.002, 0.001, TACTUS_STRENGTH, 0},
+	{"capacitance_offset_F_per_degC", "output1/degC", "change of the capacitance's offset per degree", 0, -1e9, 1e9,
+	 0.002, 0.001, TACTUS_STRENGTH, 1},
 	{"reference_degC", "degC", "temperature T0 at which it changes nothing", 25, -100, 300, 25, 5, TACTUS_CONSTANT, -1},
 };
 
