@@ -58,6 +58,8 @@ static void line_ends_marks_quotes_and_blanks_do_not_matter(void **state)
 	core_expect_text(texts[0], "x, \"y\"");
 	core_expect_text(texts[1], "");
 	core_expect_text(texts[2], "z");
+	assert_int_equal(tactus_table_line(table, 0), 3);
+	assert_int_equal(tactus_table_line(table, 1), 4);
 	assert_string_equal(tactus_metadata_get(tactus_table_metadata(table), "key"), "v");
 	tactus_table_free(table);
 }
@@ -394,21 +396,28 @@ static void blocks_of_any_size_give_the_same_rows(void **state)
 static void what_the_caller_changes_in_a_block_is_back_in_the_next(void **state)
 {
 	(void)state;
-	tactus_reader *reader;
-	tactus_table *block;
-	core_write_text("in.csv", "force_N,quality,channel\n1,ok,1\n2,folded,2\n");
-	assert_int_equal(tactus_reader_open("in.csv", NULL, &reader), 0);
-	for (int i = 1; i <= 2; i++) {
-		assert_int_equal(tactus_reader_next(reader, 1, &block), 1);
-		core_expect_text(tactus_table_texts(block, "quality")[0], i == 1 ? "ok" : "folded");
-		assert_true(tactus_table_numbers(block, "force_N")[0] == i);
-		tactus_table_set_texts(block, "quality")[0] = (tactus_text){"mine", 4};
-		assert_true(isnan(tactus_table_set_numbers(block, "force_N")[0]));
-		assert_true(isnan(tactus_table_set_numbers(block, "added_V")[0]));
-		tactus_table_remove(block, "channel");
-		assert_int_equal(tactus_table_columns(block), 3);
+	const char *const files[] = {"force_N,quality,channel,wire\n1,ok,1,red\n2,folded,2,blue\n",
+								 "{\"force_N\":1,\"quality\":\"ok\",\"channel\":1,\"wire\":\"red\"}\n"
+								 "{\"force_N\":2,\"quality\":\"folded\",\"channel\":2,\"wire\":\"blue\"}\n"};
+	for (size_t f = 0; f < TACTUS_COUNT(files); f++) {
+		tactus_reader *reader;
+		tactus_table *block;
+		core_write_text("in.csv", files[f]);
+		assert_int_equal(tactus_reader_open("in.csv", NULL, &reader), 0);
+		for (int i = 1; i <= 2; i++) {
+			assert_int_equal(tactus_reader_next(reader, 1, &block), 1);
+			core_expect_text(tactus_table_texts(block, "quality")[0], i == 1 ? "ok" : "folded");
+			core_expect_text(tactus_table_texts(block, "wire")[0], i == 1 ? "red" : "blue");
+			assert_true(tactus_table_numbers(block, "force_N")[0] == i);
+			tactus_table_set_texts(block, "quality")[0] = (tactus_text){"mine", 4};
+			assert_true(isnan(tactus_table_set_numbers(block, "wire")[0]));
+			assert_true(isnan(tactus_table_set_numbers(block, "force_N")[0]));
+			assert_true(isnan(tactus_table_set_numbers(block, "added_V")[0]));
+			tactus_table_remove(block, "channel");
+			assert_int_equal(tactus_table_columns(block), 4);
+		}
+		tactus_reader_close(reader);
 	}
-	tactus_reader_close(reader);
 }
 
 int main(void)
