@@ -27,6 +27,7 @@ enum cli_exit {
 enum cli_kind {
 	CLI_FLAG,    /* no argument */
 	CLI_STRING,  /* any text */
+	CLI_LETTER,  /* one character, or "tab" */
 	CLI_FILE,    /* completion offers files */
 	CLI_CHOICE,  /* one of `choices`, separated by '|' */
 	CLI_INTEGER, /* a whole number ≥ 0 */
@@ -71,7 +72,7 @@ struct cli_command {
 		"model-file", 'm', CLI_FILE, "MODEL", NULL, "the model file, as `tactus fit` writes it"                        \
 	}
 #define CLI_OPTIONS_READ                                                                                               \
-	{"delimiter", 0, CLI_STRING, "CHAR", NULL, "field separator of the input (default: told by its header)"},          \
+	{"delimiter", 0, CLI_LETTER, "CHAR", NULL, "field separator of the input (default: told by its header)"},          \
 		{"decimal-comma", 0, CLI_FLAG, NULL, NULL, "the input writes 12,5 for twelve and a half"},                     \
 	{                                                                                                                  \
 		"columns", 0, CLI_STRING, "NEW=OLD,...", NULL, "rename and scale columns: time_s=ms/1000,force_N=load*9.81"    \

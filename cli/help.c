@@ -59,9 +59,11 @@ static void print_option(FILE *out, const struct cli_option *option)
 		fprintf(out, "%s\n%*s", left, TEXT_COLUMN, "");
 	else
 		fprintf(out, "%-*s", TEXT_COLUMN, left);
-	char text[256];
+	char text[384];
 	bool choices = option->kind == CLI_CHOICE && argument != option->unit;
-	snprintf(text, sizeof text, "%s%s%s", option->help, choices ? ": " : "", choices ? option->unit : "");
+	n = snprintf(text, sizeof text, "%s%s", option->help, choices ? ": " : "");
+	for (const char *c = choices ? option->unit : ""; *c && n < (int)sizeof text - 3; c++)
+		n += snprintf(text + n, sizeof text - (size_t)n, "%s%.1s", *c == '|' ? "," : "", *c == '|' ? " " : c);
 	cli_wrap(out, text, TEXT_COLUMN, TEXT_COLUMN);
 }
 

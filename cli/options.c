@@ -81,6 +81,10 @@ static int check_value(const struct cli *cli, const struct cli_option *option, s
 	case CLI_FLAG:
 	case CLI_STRING:
 		return 0;
+	case CLI_LETTER:
+		if (strlen(value->text) != 1 && strcmp(value->text, "tab") != 0)
+			return cli_error(cli, CLI_USAGE, "--%s: '%s' is not one character or 'tab'", option->name, value->text);
+		return 0;
 	case CLI_FILE:
 		if (!*value->text)
 			return cli_error(cli, CLI_USAGE, "--%s: the file's name is empty", option->name);
@@ -341,7 +345,7 @@ tactus_read_options cli_read_options(const struct cli *cli)
 {
 	const char *delimiter = cli_string(cli, "delimiter", "");
 	return (tactus_read_options){
-		.delimiter = !strcmp(delimiter, "tab") || !strcmp(delimiter, "\\t") ? '\t' : delimiter[0],
+		.delimiter = !strcmp(delimiter, "tab") ? '\t' : delimiter[0],
 		.decimal_comma = cli_has(cli, "decimal-comma"),
 		.columns = cli_string(cli, "columns", NULL),
 	};
