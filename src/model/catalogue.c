@@ -136,9 +136,18 @@ size_t tactus_effect_parameters(const tactus_effect *effect)
 	return effect->parameter_count;
 }
 
+/* "output0/degC" → "output/degC": which output it acts on is in its name. */
+static const char *public_unit(const char *unit)
+{
+	static const char *const units[] = {"output", "output/degC"};
+	for (size_t i = 0; i < TACTUS_COUNT(units); i++)
+		if (strncmp(unit, "output", 6) == 0 && strcmp(unit + 7, units[i] + 6) == 0)
+			return units[i];
+	return unit;
+}
+
 tactus_parameter_info tactus_effect_parameter(const tactus_effect *effect, size_t i)
 {
 	const tactus_parameter *p = &effect->parameters[i];
-	bool of_output = strcmp(p->unit, "output0") == 0 || strcmp(p->unit, "output1") == 0;
-	return (tactus_parameter_info){p->name, of_output ? "output" : p->unit, p->summary, p->neutral, p->lower, p->upper};
+	return (tactus_parameter_info){p->name, public_unit(p->unit), p->summary, p->neutral, p->lower, p->upper};
 }

@@ -79,13 +79,19 @@ static inline tactus_model *rig_model(const char *outputs, int channels)
 /* A parameter's start in a recording of 0 to 10 N, 1e-4 S and 2e-11 F; see tactus_parameter. */
 static inline double rig_start(const tactus_parameter *p)
 {
-	double factor = strcmp(p->unit, "output0") == 0   ? rig_g1 * rig_range_N
-					: strcmp(p->unit, "output1") == 0 ? rig_c1 * rig_range_N
-					: strcmp(p->unit, "N") == 0       ? rig_range_N
-					: strcmp(p->unit, "1/N") == 0     ? 1 / rig_range_N
-													  : 1;
+	double factor = strncmp(p->unit, "output0", 7) == 0   ? rig_g1 * rig_range_N
+					: strncmp(p->unit, "output1", 7) == 0 ? rig_c1 * rig_range_N
+					: strcmp(p->unit, "N") == 0           ? rig_range_N
+					: strcmp(p->unit, "1/N") == 0         ? 1 / rig_range_N
+														  : 1;
 	double value = p->start * factor;
 	return value < p->lower ? p->lower : value > p->upper ? p->upper : value;
+}
+
+/* A parameter of an output that the model does not have is none of its parameters. */
+static inline bool rig_has_output(const tactus_model *model, int output)
+{
+	return output < 0 || model->output_name[output] != NULL;
 }
 
 /* Adds an effect with every strength and shape where a fit would start, or neutral. */
@@ -94,7 +100,7 @@ static inline void rig_effect(tactus_model *model, const tactus_effect *effect, 
 	rig_ok(tactus_model_add_effect(model, effect));
 	for (size_t c = 0; active && c < model->channel_count; c++)
 		for (size_t i = 0; i < effect->parameter_count; i++)
-			if (effect->parameters[i].kind != TACTUS_INITIAL)
+			if (effect->parameters[i].kind != TACTUS_INITIAL && rig_has_output(model, effect->parameters[i].output))
 				rig_ok(tactus_model_set(model, c, effect->name, effect->parameters[i].name,
 										rig_start(&effect->parameters[i]), NAN));
 }
