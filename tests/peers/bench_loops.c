@@ -4,8 +4,11 @@
  */
 #include <math.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include <tactus/tactus.h>
+
+#include "fit/fit_internal.h"
 
 void bench_lockin(const float *samples_V, size_t blocks, size_t n, double rate_Hz, double frequency_Hz,
 				  double *amplitude_V, double *phase_rad);
@@ -52,4 +55,20 @@ float bench_read(const float *values, size_t n)
 		for (size_t lane = 0; lane < 8; lane++)
 			total += sum[k][lane];
 	return total;
+}
+
+/* The network fit alone, with given starts, as the peer gets it: no cross-validation, no tables. */
+int bench_network(size_t n, const double *conductance_S, const double *capacitance_F, const double *force_N,
+				  const double *starts, size_t start_count, double *parameters, double *costs);
+void bench_network_starts(uint64_t seed, uint64_t stream, size_t starts, double *weights);
+
+int bench_network(size_t n, const double *conductance_S, const double *capacitance_F, const double *force_N,
+				  const double *starts, size_t start_count, double *parameters, double *costs)
+{
+	return tactus_fit_network(n, conductance_S, capacitance_F, force_N, starts, start_count, parameters, costs);
+}
+
+void bench_network_starts(uint64_t seed, uint64_t stream, size_t starts, double *weights)
+{
+	tactus_network_starts(seed, stream, starts, weights);
 }

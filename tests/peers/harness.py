@@ -54,7 +54,7 @@ class Table:
     def add(self, what, ours, peer, ratio=None, target=None, met=None):
         """Texts for what was measured; ratio a number; target a text; met None where there is no target."""
         verdict = "" if met is None else ("met" if met else "**missed**")
-        row = (what, ours, peer, "" if ratio is None else f"{ratio:.2f}", target or "", verdict)
+        row = (what, ours, peer, "" if ratio is None else f"{ratio:.3g}", target or "", verdict)
         self.sections[-1][2].append(row)
         print(f"  {row[0]:<52}{row[1]:>12}{row[2]:>12}{row[3]:>9}  {row[4]} {verdict.strip('*')}", flush=True)
 
