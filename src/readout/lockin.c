@@ -22,11 +22,43 @@ static double wrap(double angle_rad)
 	return remainder(angle_rad, 2 * M_PI);
 }
 
-/* e^{jω(16 m + k)} = e^{jω 16 m} e^{jωk}: few sines, so that short series are not all preparation. */
+enum { FINE = 16 };
+
+/* e^{jω(16 m + k)} = e^{jω 16 m} e^{jωk}: the fine steps stand first, then the coarse ones. */
+INLINE void spread(size_t coarse, const double *cosine, const double *sine, struct tactus_lockin_reference *reference)
+{
+	for (size_t m = 0; m < coarse; m++) {
+		double c = cosine[FINE + m], s = sine[FINE + m];
+
+		for (size_t k = 0; k < FINE; k += 4) {
+			doubles re, im, product;
+
+			memcpy(&re, cosine + k, sizeof re);
+			memcpy(&im, sine + k, sizeof im);
+			product = c * re - s * im;
+			memcpy(reference->cosine + FINE * m + k, &product, sizeof product);
+			product = s * re + c * im;
+			memcpy(reference->sine + FINE * m + k, &product, sizeof product);
+		}
+	}
+}
+
+FOR_AVX2 static void spread_avx2(size_t coarse, const double *cosine, const double *sine,
+								 struct tactus_lockin_reference *reference)
+{
+	spread(coarse, cosine, sine, reference);
+}
+
+static void spread_any(size_t coarse, const double *cosine, const double *sine,
+					   struct tactus_lockin_reference *reference)
+{
+	spread(coarse, cosine, sine, reference);
+}
+
+/* Few sines for many steps, so that short series are not all preparation. */
 void tactus_lockin_prepare(struct tactus_lockin_reference *reference, double omega_rad, size_t size)
 {
-	enum { FINE = 16, COARSE = BLOCK / FINE };
-	double angle[FINE + COARSE], sine[FINE + COARSE], cosine[FINE + COARSE];
+	double angle[FINE + BLOCK / FINE], sine[FINE + BLOCK / FINE], cosine[FINE + BLOCK / FINE];
 	size_t coarse = (size + FINE - 1) / FINE;
 
 	for (size_t k = 0; k < FINE; k++)
@@ -34,11 +66,7 @@ void tactus_lockin_prepare(struct tactus_lockin_reference *reference, double ome
 	for (size_t m = 0; m < coarse; m++)
 		angle[FINE + m] = omega_rad * (double)(FINE * m);
 	tactus_sincos(FINE + coarse, angle, sine, cosine);
-	for (size_t m = 0; m < coarse; m++)
-		for (size_t k = 0; k < FINE; k++) {
-			reference->cosine[FINE * m + k] = cosine[FINE + m] * cosine[k] - sine[FINE + m] * sine[k];
-			reference->sine[FINE * m + k] = sine[FINE + m] * cosine[k] + cosine[FINE + m] * sine[k];
-		}
+	(HAVE_AVX2() ? spread_avx2 : spread_any)(coarse, cosine, sine, reference);
 	reference->omega_rad = omega_rad;
 }
 
