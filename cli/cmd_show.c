@@ -9,8 +9,8 @@
 static bool looks_like_toml(const char *file)
 {
 	char line[256];
-	bool toml = false, begins = true;
-	FILE *stream = strcmp(file, "-") ? fopen(file, "r") : NULL;
+	bool toml = strncmp(file, "sim:", 4) == 0, begins = true;
+	FILE *stream = strcmp(file, "-") && !toml ? fopen(file, "r") : NULL;
 	while (stream && fgets(line, sizeof line, stream)) {
 		bool whole = strchr(line, '\n') != NULL, blank = line[strspn(line, " \t\r\n")] == '\0';
 		if (begins && line[0] != '#' && !blank) {

@@ -19,11 +19,48 @@ static int note_model(const tactus_model *model, tactus_table *block)
 	return tactus_metadata_set(tactus_table_metadata(block), "model", fingerprint);
 }
 
+static int write_whole(const struct cli *cli, const tactus_table *table)
+{
+	tactus_writer *writer;
+	int error = cli_open_writer(cli, &writer);
+	if (error)
+		return error;
+	error = tactus_writer_rows(writer, table);
+	if (!error)
+		return tactus_writer_close(writer);
+	tactus_writer_abort(writer);
+	return error;
+}
+
+/* A model that couples channels or looks ahead needs all rows at once. */
+static int over_whole(const struct cli *cli, const tactus_model *model, const char *recording, uint64_t seed)
+{
+	tactus_table *table;
+	tactus_read_options options = cli_read_options(cli);
+	int error = tactus_table_read(recording, &options, &table);
+	if (error)
+		return cli_fail(cli, error);
+	tactus_simulator *simulator = NULL;
+	error = note_model(model, table);
+	if (!error)
+		error = tactus_simulator_new(model, table, seed, &simulator);
+	if (!error)
+		error = tactus_simulator_block(simulator, table);
+	if (!error)
+		error = write_whole(cli, table);
+	int status = cli_fail(cli, error);
+	tactus_simulator_free(simulator);
+	tactus_table_free(table);
+	return status;
+}
+
 static int over_recording(const struct cli *cli, const tactus_model *model, uint64_t seed)
 {
 	const char *recording = cli_recording(cli, 0);
 	if (!recording)
 		return CLI_USAGE;
+	if (tactus_model_whole(model))
+		return over_whole(cli, model, recording, seed);
 	tactus_reader *reader;
 	tactus_read_options options = cli_read_options(cli);
 	int error = tactus_reader_open(recording, &options, &reader);
@@ -172,14 +209,14 @@ static int run(struct cli *cli)
 {
 	const char *file = cli_string(cli, "model-file", NULL);
 	if (!file)
-		return cli_error(cli, CLI_USAGE, "-m MODEL is needed: a model file");
+		return cli_error(cli, CLI_USAGE, "-m MODEL is needed: a model file, or a bench");
 	uint64_t seed = cli_integer(cli, "seed", 1);
 	if (seed == 0)
 		return cli_error(cli, CLI_USAGE, "--seed: '0' is no seed; from 1 on");
 	if (cli_has(cli, "rate") && !cli_has(cli, "protocol"))
 		return cli_error(cli, CLI_USAGE, "--rate goes with --protocol; a recording has its own times");
 	tactus_model *model;
-	int error = tactus_model_read(file, &model);
+	int error = tactus_bench_is(file) ? tactus_bench_model(file, &model) : tactus_model_read(file, &model);
 	if (error)
 		return cli_fail(cli, error);
 	uint64_t noise = cli_has(cli, "noise") ? seed : 0;
@@ -212,9 +249,13 @@ const struct cli_command cli_simulate = {
 		"has. Without --noise the outputs are the model's own; with it, they scatter like the residuals of its "
 		"calibration, and the same --seed gives the same bytes.\n\n"
 		"With --protocol the loads are described in words, such as \"rest 2s, staircase 0N..50N 5N 2s\", and every "
-		"channel feels them at once. An estimator (a model from readings to force) cannot be simulated.",
+		"channel feels them at once.\n\n"
+		"Where -m names a bench (sim:, sim:lebosse or a bench file), its sensors are the model: base, effects and, "
+		"with --noise, their repeatability, but not the electronics; `tactus scan` has those. An estimator (a model "
+		"from readings to force) cannot be simulated.",
 	.examples = "tactus simulate -m model.toml run.csv  # beside the readings of run.csv\n"
-				"tactus simulate -m model.toml --protocol \"sine 0.5Hz 1N..3N 60s\" --rate 100Hz\n",
+				"tactus simulate -m model.toml --protocol \"sine 0.5Hz 1N..3N 60s\" --rate 100Hz\n"
+				"tactus simulate -m sim:lebosse --protocol \"cycle 0.25Hz 1N..4N 60s\" --rate 50Hz\n",
 	.options = options,
 	.arguments_max = 1,
 	.run = run,

@@ -95,6 +95,12 @@ static void print_channel(const tactus_model *model, size_t channel)
 	}
 }
 
+static void print_metadata(const tactus_metadata *metadata)
+{
+	for (size_t i = 0; i < tactus_metadata_count(metadata); i++)
+		printf("  %-22s %s\n", tactus_metadata_key(metadata, i), tactus_metadata_value(metadata, i));
+}
+
 static void print_model(const tactus_model *model, const char *file)
 {
 	char fingerprint[17];
@@ -110,8 +116,7 @@ static void print_model(const tactus_model *model, const char *file)
 	const tactus_metadata *provenance = tactus_model_provenance(model);
 	if (tactus_metadata_count(provenance))
 		puts("\nwhere it came from");
-	for (size_t i = 0; i < tactus_metadata_count(provenance); i++)
-		printf("  %-20s %s\n", tactus_metadata_key(provenance, i), tactus_metadata_value(provenance, i));
+	print_metadata(provenance);
 }
 
 /* ---- JSON
@@ -162,12 +167,13 @@ static void json_channel(struct cli_json *json, const tactus_model *model, size_
 	cli_json_close(json);
 }
 
-static int json_model(const tactus_model *model, const char *file)
+/* A model, or with `bench` a bench: its facts beside the model of its sensors. */
+static int json_model(const tactus_model *model, const char *file, const tactus_metadata *bench)
 {
 	char fingerprint[17];
 	tactus_model_fingerprint(model, fingerprint);
 	struct cli_json *json = cli_json_begin();
-	cli_json_string(json, "kind", "model");
+	cli_json_string(json, "kind", bench ? "bench" : "model");
 	cli_json_string(json, "file", file);
 	cli_json_string(json, "domain", tactus_domain_name(tactus_model_domain(model)));
 	cli_json_string(json, "form", tactus_form_name(tactus_model_form(model)));
@@ -181,22 +187,51 @@ static int json_model(const tactus_model *model, const char *file)
 	for (size_t c = 0; c < tactus_model_channels(model); c++)
 		json_channel(json, model, c);
 	cli_json_close(json);
-	cli_json_object(json, "provenance");
-	const tactus_metadata *provenance = tactus_model_provenance(model);
-	for (size_t i = 0; i < tactus_metadata_count(provenance); i++)
-		cli_json_string(json, tactus_metadata_key(provenance, i), tactus_metadata_value(provenance, i));
+	const tactus_metadata *facts = bench ? bench : tactus_model_provenance(model);
+	cli_json_object(json, bench ? "bench" : "provenance");
+	for (size_t i = 0; i < tactus_metadata_count(facts); i++)
+		cli_json_string(json, tactus_metadata_key(facts, i), tactus_metadata_value(facts, i));
 	return cli_json_end(json);
+}
+
+/* A bench: its facts, then its sensors as the model that they are. */
+static int show_bench(const struct cli *cli, const char *file)
+{
+	tactus_metadata *facts;
+	tactus_model *model;
+	int error = tactus_bench_describe(file, &facts);
+	if (error)
+		return cli_fail(cli, error);
+	error = tactus_bench_model(file, &model);
+	if (error) {
+		tactus_metadata_free(facts);
+		return cli_fail(cli, error);
+	}
+	int status = CLI_OK;
+	if (cli_has(cli, "json")) {
+		status = json_model(model, file, facts);
+	} else {
+		printf("%s: bench\n", file);
+		print_metadata(facts);
+		puts("\nits sensors");
+		print_model(model, file);
+	}
+	tactus_metadata_free(facts);
+	tactus_model_free(model);
+	return status;
 }
 
 int cli_show_model(const struct cli *cli, const char *file)
 {
+	if (tactus_bench_is(file))
+		return show_bench(cli, file);
 	tactus_model *model;
 	int error = tactus_model_read(file, &model);
 	if (error)
 		return cli_fail(cli, error);
 	int status = CLI_OK;
 	if (cli_has(cli, "json"))
-		status = json_model(model, file);
+		status = json_model(model, file, NULL);
 	else
 		print_model(model, file);
 	tactus_model_free(model);

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include <tactus/export.h>
+#include <tactus/model.h>
 #include <tactus/readout.h>
 #include <tactus/table.h>
 
@@ -91,6 +92,21 @@ TACTUS_API uint64_t tactus_device_expected_scans(const tactus_device *device);
  */
 TACTUS_API int tactus_device_list(bool (*found)(void *context, const char *uri, const char *description),
 								  void *context);
+
+/* ---- benches ------------------------------------------------------------------------------------------------------
+ */
+
+/** True for a "sim:" URI and for a bench file. */
+TACTUS_API bool tactus_bench_is(const char *path);
+/**
+ * The films of a bench's sensors as a forward model of conductance and capacitance: base, effects and repeatability
+ * (as residuals), without the electronics. bench is a "sim:" URI, a built-in bench's name or a file. Free with
+ * tactus_model_free(); TACTUS_ERR_DEVICE if there is no such bench, TACTUS_ERR_INPUT with FILE:LINE:COLUMN.
+ */
+TACTUS_API int tactus_bench_model(const char *bench, tactus_model **model);
+/** What a bench is made of, as `key: value` with units in the keys. Free with tactus_metadata_free(); errors as above.
+ */
+TACTUS_API int tactus_bench_describe(const char *bench, tactus_metadata **facts);
 
 /**
  * Readings of a scan as a table in the contract's columns: raw (detector volts) or as amplitude and phase, ready for

@@ -271,7 +271,7 @@ static int read_document(const tactus_toml *document, tactus_model **out)
 	if (status < 0)
 		return status;
 	if (!kind || strcmp(kind, "model") != 0)
-		return tactus_toml_fail(root, "kind", TACTUS_ERR_INPUT, "not a model file: it does not say `kind = \"model\"`");
+		return tactus_toml_fail(root, "kind", TACTUS_ERR_INPUT, "not a model file: it does not say kind = \"model\"");
 	if ((status = tactus_toml_integer(root, "format", &format)) < 0)
 		return status;
 	if (format != 1)
