@@ -1,5 +1,6 @@
 /* What is said on standard error, the exit status that an error maps to, signals, the last words of standard output. */
 #include <errno.h>
+#include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -163,11 +164,18 @@ void cli_catch_signals(void)
 	sigaction(SIGTERM, &action, NULL);
 }
 
+/* An earlier write may have met the closed pipe and its errno be gone: the pipe itself still says so. */
+static bool reader_gone(void)
+{
+	struct pollfd out = {.fd = STDOUT_FILENO, .events = POLLOUT};
+	return errno == EPIPE || (poll(&out, 1, 0) == 1 && (out.revents & POLLERR) != 0);
+}
+
 int cli_finish_stdout(int status)
 {
 	errno = 0;
 	bool failed = fflush(stdout) != 0 || ferror(stdout);
-	if (!failed || errno == EPIPE || status != CLI_OK)
+	if (!failed || status != CLI_OK || reader_gone())
 		return status;
 	return cli_error(NULL, CLI_OUTPUT, "standard output: %s", strerror(errno ? errno : EIO));
 }
