@@ -126,17 +126,18 @@ TACTUS_API tactus_reading_facts tactus_model_reading(const tactus_model *model, 
 /* ---- simulate: inputs → outputs, block by block --------------------------------------------------------------------
  */
 
+/**
+ * True if the model couples channels or looks ahead in time: neighbours' loads and later samples are looked up in the
+ * block, so simulate the whole recording as one. Any other model gives the same bits however the recording is cut.
+ */
+TACTUS_API bool tactus_model_whole(const tactus_model *model);
+
 typedef struct tactus_simulator tactus_simulator;
 
 /** TACTUS_ERR_UNSUPPORTED for an estimator; TACTUS_ERR_INPUT if an input column is missing. seed 0: without noise. */
 TACTUS_API int tactus_simulator_new(const tactus_model *model, tactus_table *block, uint64_t seed,
 									tactus_simulator **simulator);
 TACTUS_API void tactus_simulator_free(tactus_simulator *simulator);
-/**
- * True if the model couples channels or shifts time: neighbours' loads and samples ahead are looked up in the block, so
- * give the whole recording as one. Any other model gives the same bits however the recording is cut.
- */
-TACTUS_API bool tactus_simulator_whole(const tactus_simulator *simulator);
 /** Fills or replaces the output columns of a block; rows of channels that the model has not are left empty. */
 TACTUS_API int tactus_simulator_block(tactus_simulator *simulator, tactus_table *block);
 

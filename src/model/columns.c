@@ -222,7 +222,7 @@ bool tactus_columns_in_mode(const tactus_columns *columns, size_t row, const cha
 		   tactus_columns_has_mode(columns, row, mode);
 }
 
-int tactus_columns_support(const tactus_columns *columns, const tactus_effect *effect)
+static int support_effect(const tactus_columns *columns, const tactus_effect *effect)
 {
 	for (size_t s = 0; s < columns->domain->signal_count; s++) {
 		const tactus_signal *kind = &columns->domain->signals[s];
@@ -233,4 +233,14 @@ int tactus_columns_support(const tactus_columns *columns, const tactus_effect *e
 							   tactus_columns_where(columns), kind->name, effect->name);
 	}
 	return TACTUS_OK;
+}
+
+int tactus_columns_support(const tactus_columns *columns, const tactus_model *model)
+{
+	int status = TACTUS_OK;
+	for (size_t c = 0; c < model->channel_count; c++)
+		for (size_t k = 0; status == TACTUS_OK && k < model->effect_count; k++)
+			if (!tactus_effect_neutral(model->effects[k], model->channels[c].effect[k]))
+				status = support_effect(columns, model->effects[k]);
+	return status;
 }

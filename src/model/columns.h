@@ -2,7 +2,7 @@
 #ifndef TACTUS_COLUMNS_H
 #define TACTUS_COLUMNS_H
 
-#include "model/engine.h"
+#include "model/model.h"
 #include "model/series.h"
 
 #ifdef __cplusplus
@@ -37,8 +37,8 @@ int tactus_columns_channel(const tactus_columns *columns, size_t row, int *chann
 bool tactus_columns_has_mode(const tactus_columns *columns, size_t row, const char *mode);
 /* True if the row is of that mode, or nothing is said: mode "" (or NULL), or no mode in the row. */
 bool tactus_columns_in_mode(const tactus_columns *columns, size_t row, const char *mode);
-/* TACTUS_ERR_INPUT if an effect needs the clock or a covariate that the table does not have. */
-int tactus_columns_support(const tactus_columns *columns, const tactus_effect *effect);
+/* TACTUS_ERR_INPUT if an active effect of a model needs the clock or a covariate that the table does not have. */
+int tactus_columns_support(const tactus_columns *columns, const tactus_model *model);
 
 #ifdef __cplusplus
 }

@@ -37,10 +37,8 @@ static int check_block(const tactus_estimator *estimator)
 {
 	const tactus_model *model = estimator->model;
 	int status = check_readings(estimator);
-	for (size_t c = 0; c < model->channel_count; c++)
-		for (size_t k = 0; status == TACTUS_OK && k < model->effect_count; k++)
-			if (!tactus_effect_neutral(model->effects[k], model->channels[c].effect[k]))
-				status = tactus_columns_support(&estimator->columns, model->effects[k]);
+	if (status == TACTUS_OK)
+		status = tactus_columns_support(&estimator->columns, model);
 	if (status == TACTUS_OK && estimator->columns.channel == NULL && model->channel_count > 1)
 		return tactus_fail(TACTUS_ERR_INPUT, "%sno column 'channel', and the model has %zu channels",
 						   tactus_columns_where(&estimator->columns), model->channel_count);

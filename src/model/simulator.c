@@ -11,28 +11,19 @@
 struct tactus_simulator {
 	tactus_model *model;
 	uint64_t seed;
-	bool whole;
 	tactus_series_options options;
 	tactus_chain **chains; /* one per channel of the model */
 	uint64_t *samples;     /* so far, per channel: the noise counts on */
 };
 
-/* Columns that the model's active effects need; notes whether one looks beyond its own row. */
-static int check_effects(tactus_simulator *simulator, const tactus_columns *columns)
+bool tactus_model_whole(const tactus_model *model)
 {
-	const tactus_model *model = simulator->model;
 	for (size_t c = 0; c < model->channel_count; c++)
-		for (size_t k = 0; k < model->effect_count; k++) {
-			const tactus_effect *effect = model->effects[k];
-			if (tactus_effect_neutral(effect, model->channels[c].effect[k]))
-				continue;
-			int status = tactus_columns_support(columns, effect);
-			if (status < 0)
-				return status;
-			if ((effect->flags & (TACTUS_EFFECT_NEIGHBOURS | TACTUS_EFFECT_LOOKAHEAD)) != 0)
-				simulator->whole = true;
-		}
-	return TACTUS_OK;
+		for (size_t k = 0; k < model->effect_count; k++)
+			if ((model->effects[k]->flags & (TACTUS_EFFECT_NEIGHBOURS | TACTUS_EFFECT_LOOKAHEAD)) != 0 &&
+				!tactus_effect_neutral(model->effects[k], model->channels[c].effect[k]))
+				return true;
+	return false;
 }
 
 static int make_chains(tactus_simulator *simulator)
@@ -76,7 +67,7 @@ static int check_block(tactus_simulator *simulator, tactus_table *block)
 	if (model->domain == &tactus_domain_sensor && columns.channel == NULL && model->channel_count > 1)
 		return tactus_fail(TACTUS_ERR_INPUT, "%sno column 'channel', and the model has %zu channels",
 						   tactus_columns_where(&columns), model->channel_count);
-	status = check_effects(simulator, &columns);
+	status = tactus_columns_support(&columns, model);
 	double *output[TACTUS_OUTPUTS_MAX];
 	return status < 0 ? status : add_outputs(model, block, output);
 }
@@ -119,11 +110,6 @@ void tactus_simulator_free(tactus_simulator *simulator)
 	free(simulator->samples);
 	tactus_model_free(simulator->model);
 	free(simulator);
-}
-
-bool tactus_simulator_whole(const tactus_simulator *simulator)
-{
-	return simulator->whole;
 }
 
 /* Noise as large as the residuals of the calibration, in the k-th sample of a channel. */
