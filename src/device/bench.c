@@ -23,24 +23,17 @@ const char *tactus_builtin_find(const char *name)
 #define POSITIVE 1e-300, INFINITY
 #define NOT_NEGATIVE 0, INFINITY
 #define ANY -INFINITY, INFINITY
+/* clang-format off */
+/* NOLINTBEGIN(bugprone-macro-parentheses): a member cannot stand in parentheses */
+#define KEY(section, field, ...) {#section, {#field, 'n', offsetof(tactus_bench, section.field), __VA_ARGS__}}
+#define SWITCH(section, field) {#section, {#field, 'b', offsetof(tactus_bench, section.field), 0, 0}}
+/* NOLINTEND(bugprone-macro-parentheses) */
+/* clang-format on */
+
 static const struct {
 	const char *section;
 	tactus_bench_key key;
 } keys[] = {
-#define KEY(section, field, ...)                                                                                       \
-	{                                                                                                                  \
-#section,                                                                                                      \
-		{                                                                                                              \
-#field, 'n', offsetof(tactus_bench, section.field), __VA_ARGS__                                            \
-		}                                                                                                              \
-	}
-#define SWITCH(section, field)                                                                                         \
-	{                                                                                                                  \
-#section,                                                                                                      \
-		{                                                                                                              \
-#field, 'b', offsetof(tactus_bench, section.field), 0, 0                                                   \
-		}                                                                                                              \
-	}
 	KEY(scan, rate_Hz, POSITIVE),
 	KEY(scan, settle_s, NOT_NEGATIVE),
 	KEY(scan, drive_V, POSITIVE),
@@ -86,15 +79,19 @@ static const struct {
 int tactus_bench_read_key(const tactus_toml_node *table, const tactus_bench_key *key, void *object)
 {
 	char *field = (char *)object + key->offset;
-	if (key->kind == 'b')
-		return tactus_toml_bool(table, key->name, (bool *)field);
+	bool truth = false;
 	double value = 0;
-	const int status = tactus_toml_number(table, key->name, &value);
+	const int status =
+		key->kind == 'b' ? tactus_toml_bool(table, key->name, &truth) : tactus_toml_number(table, key->name, &value);
 	if (status <= 0)
 		return status;
+	if (key->kind == 'b') {
+		memcpy(field, &truth, sizeof(truth));
+		return 1;
+	}
 	if (value < key->lower || value > key->upper)
 		return tactus_toml_fail(table, key->name, TACTUS_ERR_INPUT, "%s = %g is out of range", key->name, value);
-	*(double *)field = value;
+	memcpy(field, &value, sizeof(value));
 	return 1;
 }
 

@@ -1,6 +1,7 @@
 /* Devices by URI: finds the backend in a const table and hands on. */
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -13,11 +14,10 @@ static const tactus_backend *const backends[] = {&tactus_backend_sim, &tactus_ba
 static int fail_unknown_scheme(const char *uri)
 {
 	char names[128] = "";
-	for (size_t i = 0; i < TACTUS_COUNT(backends); i++) {
-		strcat(names, i > 0 ? ", " : "");
-		strcat(names, backends[i]->scheme);
-		strcat(names, ":");
-	}
+	size_t length = 0;
+	for (size_t i = 0; i < TACTUS_COUNT(backends); i++)
+		length +=
+			(size_t)snprintf(names + length, sizeof(names) - length, "%s%s:", i > 0 ? ", " : "", backends[i]->scheme);
 	return tactus_fail(TACTUS_ERR_DEVICE, "'%s' is not the URI of a device; a URI begins with one of %s", uri, names);
 }
 

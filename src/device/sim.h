@@ -107,4 +107,33 @@ int sim_electronics_run(sim_electronics *electronics, sim_block *block, size_t c
 /* Detectors, ADC and what is known of the circuit, as a recording says them. */
 int sim_electronics_metadata(const tactus_bench *bench, unsigned modes, tactus_metadata *metadata);
 
+/* ---- a scan: sim.c and sim_settings.c
+ * -------------------------------------------------------------------------------- */
+
+#define SIM_TICKS_PER_S 1e6 /* of the bench's timer, which starts scans and stamps readings */
+
+typedef struct {
+	tactus_bench *bench;
+	uint64_t seed;
+	const tactus_bench_sensor *scanned[TACTUS_BENCH_SENSORS_MAX]; /* in the order of the scan */
+	size_t channel_count, mode_count;
+	unsigned modes;
+	double drive_V, dc_drive_V, frequency_Hz, settle_s, rate_Hz, period_s; /* rate_Hz: as it was asked for */
+	uint64_t scan_count, next_scan;
+	tactus_protocol *protocol;
+	tactus_loads *loads;
+	sim_press press;
+	sim_sensor *sensors;
+	sim_electronics electronics;
+	size_t block_scans;
+	sim_block block;
+	size_t delivered; /* readings of the block */
+	double *scratch;
+	bool realtime;
+	tactus_pace pace;
+} tactus_sim;
+
+/* Fills what a scan is; TACTUS_ERR_ARGUMENT if the bench cannot do it. */
+int sim_settings(tactus_sim *sim, const tactus_scan_settings *settings);
+
 #endif

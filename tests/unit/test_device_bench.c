@@ -137,7 +137,7 @@ static void test_a_later_file_changes_an_effect_of_its_base(void **state)
 			const tactus_bench_effect *a = &base->sensors[i].effects.item[k], *b = &bench->sensors[i].effects.item[k];
 			const bool changed = i == 1 && strcmp(tactus_effect_name(b->effect), "lag") == 0;
 			assert_ptr_equal(a->effect, b->effect);
-			assert_true((memcmp(a->parameters, b->parameters, sizeof(a->parameters)) != 0) == changed);
+			assert_true((a->parameters[0] != b->parameters[0]) == changed);
 			assert_true(!changed || b->parameters[0] == 0.2);
 		}
 	}

@@ -178,7 +178,7 @@ static void test_deep_and_long_protocols_are_refused_not_crashed_on(void **state
 	char text[4096] = "";
 	tactus_protocol *protocol = NULL;
 	for (int i = 0; i < 300; i++)
-		strcat(text, "repeat 2 (");
+		memcpy(text + 10 * (size_t)i, "repeat 2 (", 11);
 	assert_int_equal(tactus_protocol_parse(text, 1, &protocol), TACTUS_ERR_ARGUMENT);
 	assert_non_null(strstr(tactus_error_message(), "parentheses"));
 	assert_int_equal(tactus_protocol_parse("repeat 1000 (repeat 1000 (rest 1s))", 1, &protocol), TACTUS_ERR_ARGUMENT);
