@@ -18,11 +18,11 @@ struct figure {
 
 static const struct figure error_figures[] = {
 	{"error", "N", "rmse_N", FIELD(rmse_N), 1},
-	{"held out", "N", "cv_rmse_N", FIELD(cv_rmse_N), 1},
+	{"CV error", "N", "cv_rmse_N", FIELD(cv_rmse_N), 1},
 	{"PER", "%", "error_reduction", FIELD(error_reduction), 100},
-	{"held out", "%", "cv_error_reduction", FIELD(cv_error_reduction), 100},
+	{"CV PER", "%", "cv_error_reduction", FIELD(cv_error_reduction), 100},
 	{"bound", "%", "bound", FIELD(bound), 100},
-	{"held out", "%", "cv_bound", FIELD(cv_bound), 100},
+	{"CV bound", "%", "cv_bound", FIELD(cv_bound), 100},
 };
 
 static const struct figure static_figures[] = {
@@ -104,7 +104,7 @@ static void print_figures(FILE *out, const tactus_fit_result *result, const stru
 /* Readings about a forward model, in their own unit. */
 static void print_outputs(FILE *out, const tactus_fit_result *result)
 {
-	fprintf(out, "channel  %-24s%*s%*s\n", "reading", WIDTH, "error", WIDTH, "held out");
+	fprintf(out, "channel  %-24s%*s%*s\n", "reading", WIDTH, "error", WIDTH, "CV error");
 	for (size_t c = 0; c < tactus_fit_channels(result); c++) {
 		const tactus_fit_channel *channel = tactus_fit_channel_at(result, c);
 		for (size_t o = 0; o < TACTUS_FIT_OUTPUTS && !channel->problem; o++) {
@@ -168,14 +168,21 @@ static void note_channel(const struct cli *cli, const tactus_fit_channel *channe
 static void print_table(const struct cli *cli, FILE *out, const tactus_fit_result *result)
 {
 	if (in_newtons(result)) {
+		fputs("Error of the force in sample and, CV, on stretches of load that the fit has not seen. PER: how much "
+			  "smaller\n"
+			  "the mean squared error is than that of `conductance`; bound: the best PER of any linear combination of\n"
+			  "the two readings.\n\n",
+			  out);
 		print_figures(out, result, error_figures, COUNT(error_figures));
-		fputc('\n', out);
+		fputs("\nStatic figures in % of full scale:\n\n", out);
 		print_figures(out, result, static_figures, COUNT(static_figures));
 	} else {
 		print_outputs(out, result);
 	}
-	fputc('\n', out);
-	print_parameters(out, tactus_fit_model(result));
+	if (tactus_model_form(tactus_fit_model(result)) != TACTUS_FORM_NETWORK) { /* weights say nothing to a reader */
+		fputc('\n', out);
+		print_parameters(out, tactus_fit_model(result));
+	}
 	for (size_t c = 0; c < tactus_fit_channels(result); c++)
 		note_channel(cli, tactus_fit_channel_at(result, c));
 }
