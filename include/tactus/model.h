@@ -169,9 +169,18 @@ TACTUS_API int tactus_estimator_new(const tactus_model *model, tactus_estimator 
 TACTUS_API void tactus_estimator_free(tactus_estimator *estimator);
 /** Forgets all that memory effects remember. */
 TACTUS_API void tactus_estimator_reset(tactus_estimator *estimator);
-/** One reading, in time order per channel; allocates nothing. */
+/**
+ * One reading, in time order per channel; allocates nothing. conductance_S and capacitance_F stand for the model's
+ * first and second output, whatever their columns are called. Coupled channels take their neighbours as last estimated.
+ */
 TACTUS_API int tactus_estimator_sample(tactus_estimator *estimator, const tactus_sample *sample, tactus_force *force);
-/** Adds force_estimate_N, force_estimate_std_N and quality to every row of a block. */
+/**
+ * Adds force_estimate_N, force_estimate_std_N and quality to every row of a block (and force_estimate_time_s where the
+ * model has a time offset). Any blocking gives the same bits, but where channels are coupled: the rows of one sequence
+ * are solved jointly as far as they are in one block, a neighbour's load that is not counts as last estimated. Where
+ * dc and ac rows of a scan are one model's, the second combines both by inverse variance. An empty force says why in
+ * quality, or its row is of a mode that was not calibrated. TACTUS_ERR_INPUT if no reading of the model is there.
+ */
 TACTUS_API int tactus_estimator_block(tactus_estimator *estimator, tactus_table *block);
 
 #ifdef __cplusplus
