@@ -101,12 +101,8 @@ const struct cli_command cli_convert = {
 		"--drive-phase at the first sample. The inverting amplifier's sign is taken out.",
 	.examples = "tactus convert run.csv -o converted.csv  # R, G and C of a recording\n"
 				"tactus scan sim: --raw | tactus convert | head -20  # live\n"
-				"tactus convert log.csv -g 1k --drive 3V --frequency 4kHz --columns "
-				"amplitude_V=peak,phase_rad=deg/57.29577951308232"
-				"  # another program's file\n"
-				"tactus convert adc.bin -w int16 --sample-rate 500kHz --sample-scale 152.6uV --drive-sampled "
-				"--drive-scale 152.6uV "
-				"--frequency 4kHz --channels 1-8 --dwell 10ms --settle 2ms -g 1k  # raw samples of a scan\n",
+				"tactus convert log.csv -g 1kohm --drive 3V --frequency 4kHz  # no metadata\n"
+				"tactus convert adc.csv -w csv --channels 1-8 --dwell 10ms --settle 2ms  # samples of a scan\n",
 	.options = options,
 	.arguments_max = 1,
 	.run = run,
