@@ -54,15 +54,19 @@ static bool curves_new(curves *c, size_t n, const double *force, const double *e
 		return false;
 	}
 	for (size_t p = 0; p < c->passes; p++) {
-		bool rising = force[turn[p + 1]] > force[turn[p]];
+		double travel = force[turn[p + 1]] - force[turn[p]];
+		bool rising = travel > 0,
+			 pass = fabs(travel) > reversal * full_scale; /* else noise at the first or last load */
 		c->direction[p] = rising ? 1 : -1;
 		size_t end = p + 1 < c->passes ? turn[p + 1] : n;
 		for (size_t i = turn[p]; i < end; i++) {
 			if (!isfinite(estimate[i]) || !isfinite(force[i]))
 				continue;
 			size_t part = part_of(force[i], low, full_scale);
-			add(&c->pass[p][part], estimate[i] - force[i]);
-			add(&c->way[rising][part], estimate[i] - force[i]);
+			if (pass) {
+				add(&c->pass[p][part], estimate[i] - force[i]);
+				add(&c->way[rising][part], estimate[i] - force[i]);
+			}
 			add(&c->all[part], estimate[i] - force[i]);
 		}
 	}

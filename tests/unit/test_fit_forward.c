@@ -167,8 +167,11 @@ static void parameters_of_an_output_that_is_not_there_are_not_fitted(void **stat
 		g[i] = 1e-6 * force[i] * (1 + 0.01 * (t[i] - 25)) + 1e-9 * rig_noise(&seed);
 	}
 	tactus_fit_result *result = rig_fit(table, &(tactus_fit_options){.effects = "temperature"});
-	tactus_parameter_value p = rig_parameter(result, 0, "temperature", "capacitance_gain_per_degC");
-	assert_true(p.value == 0 && isnan(p.standard_error));
+	for (size_t i = 0; i < tactus_model_parameters(tactus_fit_model(result), 0); i++) {
+		tactus_parameter_value p = tactus_model_parameter(tactus_fit_model(result), 0, i);
+		assert_null(strstr(p.name, "capacitance")); /* the model does not even list them */
+		assert_string_not_equal(p.name, "c1");
+	}
 	rig_recovered(rig_parameter(result, 0, "temperature", "conductance_gain_per_degC"), 0.01, 4, 1e-3);
 	tactus_fit_free(result);
 	tactus_table_free(table);
