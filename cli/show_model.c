@@ -14,7 +14,7 @@ const char *cli_value_text(double value, double standard_error, const char *unit
 	int n = snprintf(text, 96, "%.*g", digits, value);
 	if (!isnan(standard_error))
 		n += snprintf(text + n, 96 - (size_t)n, " ± %.2g", standard_error);
-	if (*unit)
+	if (*unit && strcmp(unit, "1") != 0)
 		snprintf(text + n, 96 - (size_t)n, " %s", unit);
 	return text;
 }
@@ -91,7 +91,8 @@ static void print_channel(const tactus_model *model, size_t channel)
 		if (strcmp(effect, p.effect) != 0)
 			printf("  %s\n", p.effect);
 		effect = p.effect;
-		printf("  %s%-20s %s\n", *effect ? "  " : "", p.name, cli_value_text(p.value, p.standard_error, p.unit, text));
+		printf("  %s%-*s %s\n", *effect ? "  " : "", *effect ? 30 : 32, p.name,
+			   cli_value_text(p.value, p.standard_error, p.unit, text));
 	}
 }
 

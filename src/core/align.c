@@ -196,6 +196,7 @@ static int search_grid(const tactus_track *tracks, size_t n, const tactus_track 
 struct clocks {
 	double offset_s, drift, pivot_s;
 	double width_s; /* half-width of the difference that stands for the force's rate */
+	double limit_s; /* largest offset allowed; NaN: any */
 };
 
 /* One track at given clocks: a straight line over the force, and how its residuals move with offset and drift. */
@@ -332,6 +333,21 @@ static bool invert(const double m[2][2], bool drift, double inverse[2][2])
 	return true;
 }
 
+/* The step that Gauss-Newton wants; false where nothing tells it. */
+static bool newton_step(const struct whole *whole, bool drift, double step[2])
+{
+	double inverse[2][2];
+	bool known = invert((const double(*)[2])whole->normal, drift, inverse);
+	for (int p = 0; p < 2; p++)
+		step[p] = known ? inverse[p][0] * whole->gradient[0] + inverse[p][1] * whole->gradient[1] : 0;
+	return known;
+}
+
+static bool allowed(const struct clocks *clocks, double offset_s)
+{
+	return isnan(clocks->limit_s) || fabs(offset_s) <= clocks->limit_s;
+}
+
 /* Gauss-Newton with halved steps, from the best point of a fine scan around the grid's. */
 static void refine(const tactus_track *tracks, size_t n, const tactus_track *reference, const struct axis *axis,
 				   bool drift, struct clocks *clocks, struct whole *whole)
@@ -342,17 +358,15 @@ static void refine(const tactus_track *tracks, size_t n, const tactus_track *ref
 		struct clocks tried = *clocks;
 		tried.offset_s = centre + axis->step_s * i / FINE_STEPS;
 		struct whole there = fit_all(tracks, n, reference, &tried);
-		if (there.likelihood > whole->likelihood) {
+		if (there.likelihood > whole->likelihood && allowed(clocks, tried.offset_s)) {
 			*whole = there;
 			*clocks = tried;
 		}
 	}
 	for (int iteration = 0; iteration < ITERATIONS; iteration++) {
-		double inverse[2][2], step[2];
-		if (!invert((const double(*)[2])whole->normal, drift, inverse))
+		double step[2];
+		if (!newton_step(whole, drift, step))
 			return;
-		for (int p = 0; p < 2; p++)
-			step[p] = inverse[p][0] * whole->gradient[0] + inverse[p][1] * whole->gradient[1];
 		struct whole there = *whole;
 		struct clocks tried = *clocks;
 		bool better = false;
@@ -361,7 +375,7 @@ static void refine(const tactus_track *tracks, size_t n, const tactus_track *ref
 			tried.offset_s += share * step[0];
 			tried.drift += share * step[1];
 			there = fit_all(tracks, n, reference, &tried);
-			better = there.likelihood > whole->likelihood;
+			better = there.likelihood > whole->likelihood && allowed(clocks, tried.offset_s);
 		}
 		if (!better)
 			return;
@@ -389,11 +403,11 @@ int tactus_align(const tactus_track *tracks, size_t n, const tactus_track *refer
 				 const tactus_join_options *options, tactus_join_result *result)
 {
 	struct axis axis;
-	double mean, std, inverse[2][2];
+	double mean, std, step[2], inverse[2][2];
 	moments(reference, &mean, &std);
 	if (!(std > 0))
 		return tactus_fail(TACTUS_ERR_DATA, "the reference never changes: nothing tells the offset; state it");
-	struct clocks clocks = {.pivot_s = first_of(tracks, n)};
+	struct clocks clocks = {.pivot_s = first_of(tracks, n), .limit_s = options->max_offset_s};
 	if (isinf(clocks.pivot_s))
 		return tactus_fail(TACTUS_ERR_DATA, "no channel has three readings");
 	int error = search_grid(tracks, n, reference, options->max_offset_s, &axis, result);
@@ -409,6 +423,9 @@ int tactus_align(const tactus_track *tracks, size_t n, const tactus_track *refer
 		return tactus_fail(TACTUS_ERR_DATA,
 						   "no reading follows the reference (best correlation %.2f); state the offset if it is known",
 						   whole.correlation);
+	if (newton_step(&whole, options->drift, step) && !allowed(&clocks, clocks.offset_s + step[0]))
+		return tactus_fail(TACTUS_ERR_DATA, "the readings follow the reference better beyond the largest offset, %g s",
+						   options->max_offset_s);
 	result->offset_s = clocks.offset_s;
 	result->drift = clocks.drift;
 	result->correlation = whole.correlation;
