@@ -180,6 +180,22 @@ static double loop(double force, bool rising, size_t pass)
 	return (rising ? -2 : 2) + (force >= 50 && force < 55 ? (rising ? -1 : 1) : 0);
 }
 
+/* Noise of the reference at the last load of a rising staircase goes down, but nothing was unloaded. */
+static void noise_at_the_last_load_is_no_unloading(void **state)
+{
+	(void)state;
+	enum { N = 200 };
+	double force[N], estimate[N];
+	for (int i = 0; i < N; i++) {
+		force[i] = i < 180 ? i / 1.8 : 100 - 0.02 * (i - 180);
+		estimate[i] = force[i] + (i < 180 ? 1 : -1);
+	}
+	tactus_static_figures f;
+	tactus_static_figures_of(N, NULL, force, estimate, &f);
+	assert_true(isnan(f.hysteresis_pct) && isnan(f.repeatability_pct));
+	assert_non_null(f.hysteresis_missing);
+}
+
 static void hysteresis_is_the_widest_gap_between_rising_and_falling(void **state)
 {
 	(void)state;
@@ -367,6 +383,7 @@ int main(void)
 		cmocka_unit_test(what_is_held_out_says_nothing_about_its_own_prediction),
 		cmocka_unit_test(a_network_that_learns_its_steps_is_found_out),
 		cmocka_unit_test(hysteresis_is_the_widest_gap_between_rising_and_falling),
+		cmocka_unit_test(noise_at_the_last_load_is_no_unloading),
 		cmocka_unit_test(linearity_is_the_largest_deviation_of_the_mean_curve),
 		cmocka_unit_test(repeatability_is_the_mean_deviation_of_repeated_passes),
 		cmocka_unit_test(drift_is_the_change_over_the_longest_hold),
