@@ -389,6 +389,11 @@ static void free_scan(struct scan *scan)
 static int check_usage(const struct cli *cli)
 {
 	const bool model = cli_has(cli, "model-file"), file = cli_has(cli, "output-file");
+	/* To the library zero means "as the bench has it", which is not what somebody means who writes it. */
+	static const char *const above_zero[] = {"rate", "frequency", "drive"};
+	for (size_t i = 0; i < sizeof above_zero / sizeof *above_zero; i++)
+		if (cli_quantity(cli, above_zero[i], NAN) == 0)
+			return cli_error(cli, CLI_USAGE, "--%s: must not be zero", above_zero[i]);
 	if (cli_has(cli, "tare") && !model)
 		return cli_error(cli, CLI_USAGE, "--tare needs a model (-m MODEL): it is the force that is tared");
 	if (cli_has(cli, "raw") && model)
