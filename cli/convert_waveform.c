@@ -339,9 +339,9 @@ static int push_binary(struct waveform *w, const struct binary *b, const unsigne
 
 	for (size_t i = 0; i < instants * b->lanes; i++) {
 		double value = b->value(bytes + i * b->width) * b->scale[i % b->lanes];
+		unsigned long long position = b->position + i * b->width;
 		if (!isfinite(value))
-			return cli_error(w->cli, CLI_INPUT, "%s: byte %llu: the sample is not a finite number", w->name,
-							 (unsigned long long)(b->position + i * b->width));
+			return cli_error(w->cli, CLI_INPUT, "%s: byte %llu: the sample is not a finite number", w->name, position);
 		lanes[i % b->lanes][i / b->lanes] = value;
 	}
 	return push(w, instants, lanes[0], b->lanes == 2 ? lanes[1] : NULL, NULL);
@@ -369,9 +369,9 @@ static int run_binary(struct waveform *w, struct binary *b, int file)
 		if (!status && have < sizeof buffer)
 			status = flush(w);
 	}
+	unsigned long long length = b->position + kept;
 	if (!status && kept > 0 && !cli_signal)
-		status = cli_error(w->cli, CLI_INPUT, "%s: ends within a sample, after byte %llu", w->name,
-						   (unsigned long long)(b->position + kept));
+		status = cli_error(w->cli, CLI_INPUT, "%s: ends within a sample, after byte %llu", w->name, length);
 	return status;
 }
 

@@ -121,7 +121,7 @@ void tactus_impedance_ac(const tactus_readout *readout, size_t n, const struct t
 tactus_impedance tactus_readout_ac(const tactus_readout *readout, double amplitude_V, double phase_rad, double drive_V,
 								   double frequency_Hz)
 {
-	tactus_impedance z;
+	tactus_impedance z = {0};
 	struct tactus_ac_input input = {.amplitude_V = &amplitude_V,
 									.phase_rad = &phase_rad,
 									.drive_V = &drive_V,

@@ -200,7 +200,7 @@ static void take(struct tactus_demodulator *d, size_t n, const double *samples, 
 
 		memcpy(d->output.held + d->held, samples, some * sizeof *samples);
 		samples += some;
-		if (d->waveform.drive_sampled) {
+		if (drive) {
 			memcpy(d->drive.held + d->held, drive, some * sizeof *drive);
 			drive += some;
 		}
@@ -338,8 +338,11 @@ static long put_readings(struct tactus_demodulator *d, tactus_table *table)
 long tactus_demodulator_add(tactus_demodulator *demodulator, size_t n, const double *samples_V,
 							const double *drive_samples_V, const double *channels, tactus_table *readings)
 {
-	int error = add_samples(demodulator, n, samples_V, drive_samples_V, channels);
+	bool sampled = demodulator->waveform.drive_sampled;
 
+	if (sampled && !drive_samples_V && n > 0)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "the drive's samples are not given");
+	int error = add_samples(demodulator, n, samples_V, sampled ? drive_samples_V : NULL, channels);
 	return error ? error : put_readings(demodulator, readings);
 }
 
