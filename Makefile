@@ -7,6 +7,8 @@ VERSION := $(shell sed -n 's/^.define TACTUS_VERSION "\(.*\)"/\1/p' include/tact
 SOVERSION := 0
 
 BUILD ?= build
+# One spelling of it, relative where it lies inside: the names in dependency files must be those of the targets.
+override BUILD := $(patsubst $(CURDIR)/%,%,$(abspath $(BUILD)))
 PREFIX ?= /usr/local
 DESTDIR ?=
 BINDIR ?= $(PREFIX)/bin
