@@ -126,7 +126,7 @@ static void check_strengths(const tactus_domain *domain, const tactus_effect *ef
 	rig_run(&bare, NULL, NULL, ROWS);
 	for (size_t i = 0; i < effect->parameter_count; i++) {
 		const tactus_parameter *q = &effect->parameters[i];
-		double unit = strcmp(q->unit, "output0") == 0 ? 1e-5 : strcmp(q->unit, "output1") == 0 ? 1e-10 : 1;
+		double unit = strncmp(q->unit, "output0", 7) == 0 ? 1e-5 : strncmp(q->unit, "output1", 7) == 0 ? 1e-10 : 1;
 		if (q->kind != TACTUS_STRENGTH)
 			continue;
 		rig_neutral(effect, p);
