@@ -123,8 +123,7 @@ static inline rig_scan rig_quiet(const char *added, const tactus_scan_settings *
 	static const char quiet[] =
 		"kind = \"bench\"\nbase = \"paredes\"\n[adc]\nbits = 32\nminimum_V = -10\nmaximum_V = 10\nnoise_V = 0\n"
 		"[detectors]\namplitude_filter_s = 0\nphase_filter_s = 0\ndc_filter_s = 0\n"
-		"[reference]\nnoise_N = 0\nresolution_N = 0\n[every_sensor]\nrepeatability_S = 0\nrepeatability_F = 0\n"
-		"[[effect]]\nname = \"amplifier-bandwidth\"\ninverse_gain_bandwidth_s = 0\n";
+		"[reference]\nnoise_N = 0\nresolution_N = 0\n[every_sensor]\nrepeatability_S = 0\nrepeatability_F = 0\n";
 	char *base = rig_file(".toml", quiet), text[2048];
 	snprintf(text, sizeof(text), "kind = \"bench\"\nbase = \"%s\"\n%s", base, added);
 	const rig_scan scan = rig_bench(text, settings);

@@ -205,9 +205,7 @@ static void test_loads_are_inverted_within_their_uncertainty(void **state)
 	tactus_scan_settings settings = tactus_scan_defaults();
 	settings.loads = "standard";
 	settings.modes = TACTUS_MODE_DC | TACTUS_MODE_AC;
-	rig_scan scan = rig_bench("kind = \"bench\"\nbase = \"paredes\"\n[[effect]]\nname = \"amplifier-bandwidth\"\n"
-							  "inverse_gain_bandwidth_s = 0\n",
-							  &settings);
+	rig_scan scan = rig_run("sim:", &settings, 4096);
 	tactus_table *table = rig_table(&scan, false);
 	const double *g = tactus_table_numbers(table, "conductance_S"), *c = tactus_table_numbers(table, "capacitance_F");
 	const double *gs = tactus_table_numbers(table, "conductance_std_S"),
