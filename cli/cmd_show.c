@@ -10,7 +10,7 @@ static bool looks_like_toml(const char *file)
 {
 	char line[256];
 	bool toml = strncmp(file, "sim:", 4) == 0, begins = true;
-	FILE *stream = strcmp(file, "-") && !toml ? fopen(file, "r") : NULL;
+	FILE *stream = strcmp(file, "-") != 0 && !toml ? fopen(file, "r") : NULL;
 	while (stream && fgets(line, sizeof line, stream)) {
 		bool whole = strchr(line, '\n') != NULL, blank = line[strspn(line, " \t\r\n")] == '\0';
 		if (begins && line[0] != '#' && !blank) {

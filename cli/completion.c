@@ -46,28 +46,29 @@ static void options_of(FILE *out, const struct cli_command *command)
 
 void cli_completion_bash(FILE *out)
 {
-	fputs("# bash completion of tactus; made by `tactus --completion bash`.\n"
-		  "_tactus_words() { mapfile -t COMPREPLY < <(compgen -W \"$1\" -- \"$word\"); }\n"
-		  "_tactus_files() {\n"
-		  "\tcompopt -o filenames 2>/dev/null\n"
-		  "\tmapfile -t COMPREPLY < <(compgen -f -- \"$word\")\n"
-		  "}\n"
-		  "# URIs hold colons, at which readline breaks words: only what follows the last one is offered.\n"
-		  "_tactus_uris() {\n"
-		  "\tlocal uri=$word\n"
-		  "\t[[ $word == : ]] && uri=\"$previous:\"\n"
-		  "\t[[ $previous == : ]] && uri=\"${COMP_WORDS[COMP_CWORD - 2]}:$word\"\n"
-		  "\tmapfile -t COMPREPLY < <(compgen -W \"$(tactus devices 2>/dev/null | cut -d' ' -f1) replay:\" -- \"$uri\")\n"
-		  "\tCOMPREPLY=(\"${COMPREPLY[@]#\"${uri%\"${uri##*:}\"}\"}\")\n"
-		  "\t[[ $uri == replay:* || ${#COMPREPLY[@]} -eq 0 ]] && word=${uri#*:} && _tactus_files\n"
-		  "\tcompopt -o nospace 2>/dev/null\n"
-		  "}\n"
-		  "_tactus() {\n"
-		  "\tlocal word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} "
-		  "options=\n"
-		  "\tif [[ $COMP_CWORD -eq 1 || ($COMP_CWORD -eq 2 && $command == help) ]]; then\n"
-		  "\t\t_tactus_words \"",
-		  out);
+	fputs(
+		"# bash completion of tactus; made by `tactus --completion bash`.\n"
+		"_tactus_words() { mapfile -t COMPREPLY < <(compgen -W \"$1\" -- \"$word\"); }\n"
+		"_tactus_files() {\n"
+		"\tcompopt -o filenames 2>/dev/null\n"
+		"\tmapfile -t COMPREPLY < <(compgen -f -- \"$word\")\n"
+		"}\n"
+		"# URIs hold colons, at which readline breaks words: only what follows the last one is offered.\n"
+		"_tactus_uris() {\n"
+		"\tlocal uri=$word\n"
+		"\t[[ $word == : ]] && uri=\"$previous:\"\n"
+		"\t[[ $previous == : ]] && uri=\"${COMP_WORDS[COMP_CWORD - 2]}:$word\"\n"
+		"\tmapfile -t COMPREPLY < <(compgen -W \"$(tactus devices 2>/dev/null | cut -d' ' -f1) replay:\" -- \"$uri\")\n"
+		"\tCOMPREPLY=(\"${COMPREPLY[@]#\"${uri%\"${uri##*:}\"}\"}\")\n"
+		"\t[[ $uri == replay:* || ${#COMPREPLY[@]} -eq 0 ]] && word=${uri#*:} && _tactus_files\n"
+		"\tcompopt -o nospace 2>/dev/null\n"
+		"}\n"
+		"_tactus() {\n"
+		"\tlocal word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} "
+		"options=\n"
+		"\tif [[ $COMP_CWORD -eq 1 || ($COMP_CWORD -eq 2 && $command == help) ]]; then\n"
+		"\t\t_tactus_words \"",
+		out);
 	for (const struct cli_command *const *c = cli_commands; *c; c++)
 		fprintf(out, "%s ", (*c)->name);
 	fputs("help --help --version\"\n\t\treturn\n\tfi\n\tcase $command:$previous in\n", out);

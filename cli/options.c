@@ -148,9 +148,9 @@ static int complain(const struct cli *cli, int found, const char *word)
 {
 	const struct cli_command *command = cli->command;
 	const struct cli_option *option = optopt ? cli_option_at(command, option_index(command, optopt)) : NULL;
-	if (found == ':') {
+	if (found == ':' && option) {
 		cli_error(cli, CLI_USAGE, "--%s needs %s", option->name, cli_option_argument(option));
-	} else if (optopt >= LONG_BASE) {
+	} else if (option && optopt >= LONG_BASE) {
 		cli_error(cli, CLI_USAGE, "--%s takes no value", option->name);
 	} else if (optopt) {
 		cli_error(cli, CLI_USAGE, "unknown option '-%c'", optopt);

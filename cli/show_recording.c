@@ -206,7 +206,8 @@ static int gather(tactus_reader *reader, struct recording *recording)
 	int error = 0;
 	while (!error && (rows = tactus_reader_next(reader, 0, &block)) != 0)
 		error = rows < 0 ? (int)rows : add_block(recording, block);
-	qsort(recording->channels, recording->channel_count, sizeof *recording->channels, by_number);
+	if (recording->channels)
+		qsort(recording->channels, recording->channel_count, sizeof *recording->channels, by_number);
 	return error;
 }
 

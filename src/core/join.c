@@ -62,17 +62,20 @@ static int set_median_step(tactus_track *track)
 	return TACTUS_OK;
 }
 
+static bool grow(double **values, size_t n)
+{
+	double *more = realloc(*values, n * sizeof *more);
+	if (more)
+		*values = more;
+	return more != NULL;
+}
+
 static bool room_for_one(tactus_track *track)
 {
 	size_t n = track->n;
 	if (n & (n - 1)) /* arrays have room for the next power of two */
 		return true;
-	size_t size = (n ? 2 * n : 1) * sizeof(double);
-	double *time_s = realloc(track->time_s, size);
-	track->time_s = time_s ? time_s : track->time_s;
-	double *value = realloc(track->value, size);
-	track->value = value ? value : track->value;
-	return time_s && value;
+	return grow(&track->time_s, n ? 2 * n : 1) && grow(&track->value, n ? 2 * n : 1);
 }
 
 /* Adds row of table to a track unless something is missing there. */

@@ -42,7 +42,7 @@ static double noise(uint64_t *state)
 static tactus_table *make_scan(double (*force)(double), int channels, double noise_N, uint64_t seed)
 {
 	tactus_table *table = tactus_table_new();
-	size_t rows = (size_t)(1200 * channels);
+	size_t rows = 1200 * (size_t)channels;
 	tactus_table_resize(table, rows);
 	double *time_s = tactus_table_set_numbers(table, "time_s"), *channel = tactus_table_set_numbers(table, "channel");
 	double *conductance = tactus_table_set_numbers(table, "conductance_S");
