@@ -130,6 +130,29 @@ static void test_repeatability_has_its_size_and_stands_still_with_the_load(void 
 	rig_free(&scan);
 }
 
+static void test_without_load_every_run_is_alike(void **state)
+{
+	(void)state;
+	tactus_scan_settings settings = tactus_scan_defaults();
+	settings.modes = TACTUS_MODE_DC;
+	settings.protocol = "repeat 5 (rest 1s, hold 100N 1s)";
+	rig_scan scan = rig_quiet("[every_sensor]\nrepeatability_S = 1e-6\n", &settings);
+	tactus_table *table = rig_table(&scan, false);
+	const double *g = tactus_table_numbers(table, "conductance_S");
+	size_t apart = 0;
+	for (size_t i = 0; i < scan.n; i++) {
+		const int channel = scan.readings[i].channel;
+		if (channel > 2)
+			continue;
+		const double deviation_S = g[i] - g0[channel] - g1[channel] * scan.readings[i].force_N;
+		apart += fabs(deviation_S) > 1e-8;
+		assert_true(scan.readings[i].force_N > 0 || fabs(deviation_S) < 1e-11);
+	}
+	assert_true(apart > 30); /* of 40 under load */
+	tactus_table_free(table);
+	rig_free(&scan);
+}
+
 static void test_contacts_jump_at_the_same_loads_in_both_quantities(void **state)
 {
 	(void)state;
@@ -189,6 +212,7 @@ int main(void)
 		cmocka_unit_test(test_a_readout_effect_on_one_channel_leaves_the_others),
 		cmocka_unit_test(test_a_neighbours_load_reaches_the_sensor),
 		cmocka_unit_test(test_repeatability_has_its_size_and_stands_still_with_the_load),
+		cmocka_unit_test(test_without_load_every_run_is_alike),
 		cmocka_unit_test(test_contacts_jump_at_the_same_loads_in_both_quantities),
 		cmocka_unit_test(test_the_wheel_reaches_what_the_spring_gives_and_lags),
 	};

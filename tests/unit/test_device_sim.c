@@ -117,6 +117,70 @@ static void test_filters_settle_from_the_channel_before_as_an_exponential(void *
 	}
 }
 
+static void test_the_rectifier_averages_a_dc_dwell_too(void **state)
+{
+	(void)state;
+	/*
+	 * DC and AC in turn on one channel without a pause. The rectifier's mean is |V| in DC and 2/π A in AC; with dwells
+	 * D and A the filter ends them at yD = X + (yA − X) eD and yA = x + (yD − x) eA. The reading is the mean over the
+	 * window W that follows the settle time s.
+	 */
+	tactus_scan_settings settings = tactus_scan_defaults();
+	const int channel = 1;
+	const double tau_s = 1e-3, s = 1e-3, window_s = 1e-3, e = exp(-(s + window_s) / tau_s);
+	settings.channels = &channel;
+	settings.channel_count = 1;
+	settings.settle_s = s;
+	settings.rate_Hz = 250;
+	settings.count = 50;
+	settings.protocol = "hold 200N 1s";
+	rig_scan scan = rig_quiet("[switches]\nresistance_ohm = 0\nlead_capacitance_F = 0\ncharge_C = 0\n"
+							  "[detectors]\namplitude_filter_s = 1e-3\n",
+							  &settings);
+	const double g = g0[1] + g1[1] * 200, b = 2 * pi * 4000 * (c0[1] + c1[1] * 200);
+	const double dc = 5 * 1800 * g, ac = 2 / pi * 3 * 1800 * hypot(g, b);
+	const double end_ac = (ac * (1 - e) + dc * (1 - e) * e) / (1 - e * e), end_dc = dc + (end_ac - dc) * e;
+	const double mean = ac + (end_dc - ac) * exp(-s / tau_s) * (1 - exp(-window_s / tau_s)) * tau_s / window_s;
+	assert_near(scan.readings[scan.n - 1].detector_amplitude_V, mean, 1e-8);
+	rig_free(&scan);
+}
+
+static void test_the_bench_has_waited_on_its_first_channel(void **state)
+{
+	(void)state;
+	tactus_scan_settings settings = tactus_scan_defaults();
+	settings.modes = TACTUS_MODE_DC;
+	settings.settle_s = 1e-4;
+	settings.count = 1;
+	settings.protocol = "hold 200N 1s";
+	rig_scan scan = rig_quiet("[switches]\nresistance_ohm = 0\n[detectors]\ndc_filter_s = 1e-2\n", &settings);
+	assert_near(scan.readings[0].detector_dc_V, 5 * 1800 * (g0[1] + g1[1] * 200), 1e-8);
+	rig_free(&scan);
+}
+
+static void test_an_amplifier_at_its_rails_is_flagged_and_its_clipped_sine_averaged(void **state)
+{
+	(void)state;
+	tactus_scan_settings settings = tactus_scan_defaults();
+	const int channel = 1;
+	settings.channels = &channel;
+	settings.channel_count = 1;
+	settings.count = 1;
+	settings.protocol = "hold 200N 1s";
+	rig_scan scan =
+		rig_quiet("[switches]\nresistance_ohm = 0\nlead_capacitance_F = 0\n[amplifier]\nmaximum_V = 1\n", &settings);
+	const double g = g0[1] + g1[1] * 200, b = 2 * pi * 4000 * (c0[1] + c1[1] * 200);
+	double sum = 0;
+	enum { POINTS = 100000 }; /* of a quarter of the sine, by the midpoint rule: good to 1e-9 */
+	for (int i = 0; i < POINTS; i++)
+		sum += fmin(1, 3 * 1800 * hypot(g, b) * sin((i + 0.5) / POINTS * pi / 2));
+	assert_near(scan.readings[0].detector_dc_V, 1, 1e-8);
+	assert_near(scan.readings[1].detector_amplitude_V, sum / POINTS, 1e-8);
+	for (size_t i = 0; i < 2; i++)
+		assert_true((scan.readings[i].quality & TACTUS_QUALITY_CLIPPED) != 0);
+	rig_free(&scan);
+}
+
 static void test_a_switchs_charge_is_a_pulse_that_the_filter_forgets(void **state)
 {
 	(void)state;
@@ -402,6 +466,9 @@ int main(void)
 		cmocka_unit_test(test_converted_readings_of_a_quiet_bench_are_the_sensors_own),
 		cmocka_unit_test(test_the_detectors_volts_are_those_of_rectifier_and_xor),
 		cmocka_unit_test(test_filters_settle_from_the_channel_before_as_an_exponential),
+		cmocka_unit_test(test_the_rectifier_averages_a_dc_dwell_too),
+		cmocka_unit_test(test_the_bench_has_waited_on_its_first_channel),
+		cmocka_unit_test(test_an_amplifier_at_its_rails_is_flagged_and_its_clipped_sine_averaged),
 		cmocka_unit_test(test_a_switchs_charge_is_a_pulse_that_the_filter_forgets),
 		cmocka_unit_test(test_the_converter_has_its_steps_and_says_when_it_clips),
 		cmocka_unit_test(test_noise_is_what_the_metadata_say),
