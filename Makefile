@@ -160,13 +160,13 @@ $(BUILD)/tactus.pc: FORCE
 .PHONY: demo
 demo: ## the simulated bench from scan to newtons (installs what is missing)
 	@scripts/setup
-	@$(parallel) all
+	+@$(parallel) all
 	@BUILD=$(BUILD) scripts/demo
 
 .PHONY: test
 test: ## build and run all tests (installs what is missing)
 	@scripts/setup
-	@$(parallel) all tests
+	+@$(parallel) all tests
 	@scripts/run-tests $(BUILD)
 
 .PHONY: tests
@@ -191,7 +191,7 @@ published: all ## error reductions on the simulated bench beside the paper's Tab
 .PHONY: bench
 bench: ## speed against Miller, pandas, numpy and scipy, written to BENCHMARKS.md
 	@scripts/setup --check
-	@$(parallel) all $(BUILD)/bench_loops.so
+	+@$(parallel) all $(BUILD)/bench_loops.so
 	@BUILD=$(BUILD) scripts/bench
 
 # Loops that the benchmarks call from Python; the static library, because some of them look inside.
@@ -209,7 +209,7 @@ SCRIPTS := $(shell grep -lE '^\#!/bin/(ba)?sh|^\#!/usr/bin/env bash' scripts/* .
 .PHONY: check
 check: ## formatting, clang-tidy, cppcheck, shellcheck, headers; any finding is an error
 	@scripts/setup --check
-	@$(parallel) check-format check-scripts headers check-cppcheck check-tidy
+	+@$(parallel) check-format check-scripts headers check-cppcheck check-tidy
 
 .PHONY: check-format
 check-format:
@@ -252,12 +252,12 @@ headers: ## each public header alone as C11, C17 and C++17, -pedantic -Werror
 
 .PHONY: asan
 asan: ## unit and command-line tests under AddressSanitizer and UBSan
-	@$(parallel) BUILD=$(BUILD)/asan OPT='-O1 -g' WERROR= \
+	+@$(parallel) BUILD=$(BUILD)/asan OPT='-O1 -g' WERROR= \
 		SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer' sanitized
 
 .PHONY: tsan
 tsan: ## the tests that use threads under ThreadSanitizer
-	@$(parallel) BUILD=$(BUILD)/tsan OPT='-O1 -g' WERROR= SANITIZE='-fsanitize=thread' threaded
+	+@$(parallel) BUILD=$(BUILD)/tsan OPT='-O1 -g' WERROR= SANITIZE='-fsanitize=thread' threaded
 
 .PHONY: sanitized
 sanitized: all tests
@@ -271,7 +271,7 @@ threaded: $(THREADED)
 .PHONY: coverage
 coverage: ## run unit and command-line tests with gcov and print what they reach
 	@scripts/setup --check
-	@$(parallel) BUILD=$(BUILD)/coverage OPT='-O0 -g' WERROR= SANITIZE=--coverage sanitized
+	+@$(parallel) BUILD=$(BUILD)/coverage OPT='-O0 -g' WERROR= SANITIZE=--coverage sanitized
 	@gcovr --root . --filter 'src/' --filter 'cli/' --object-directory $(BUILD)/coverage $(BUILD)/coverage
 
 # ---- documents and installation ------------------------------------------------------------------------------------

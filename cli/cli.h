@@ -58,7 +58,7 @@ struct cli_command {
 
 /* Common to all commands: --help, --quiet, --verbose, --version. Groups that several commands use are macros: */
 #define CLI_OPTIONS_OUTPUT                                                                                             \
-	{"output-file", 'o', CLI_FILE, "FILE", NULL, "write to FILE instead of standard output"},                               \
+	{"output-file", 'o', CLI_FILE, "FILE", NULL, "write to FILE instead of standard output"},                          \
 	{                                                                                                                  \
 		"overwrite", 0, CLI_FLAG, NULL, NULL, "replace FILE if it exists"                                              \
 	}
@@ -81,7 +81,7 @@ struct cli_command {
 	{"domain", 0, CLI_CHOICE, "NAME", "sensor|readout", "domain of the recording (default: told by its columns)"},     \
 		{"input", 0, CLI_STRING, "COLUMN", NULL, "column that plays the domain's input"},                              \
 	{                                                                                                                  \
-		"output", 0, CLI_STRING, "COLUMN", NULL, "column that plays the domain's output"                        \
+		"output", 0, CLI_STRING, "COLUMN", NULL, "column that plays the domain's output"                               \
 	}
 
 /* Values; defaults are returned where an option was not given. Quantities and integers were checked by the parser. */

@@ -23,8 +23,8 @@ int main()
 						 phase_rad.data(), resistance_ohm.data(), capacitance_F.data());
 	double worst = 0;
 	for (size_t i = 0; i < known_ohm.size(); i++)
-		worst = std::fmax(worst, std::fmax(std::fabs(resistance_ohm[i] / known_ohm[i] - 1),
-										   std::fabs(capacitance_F[i] / 1e-9 - 1)));
+		worst = std::fmax(
+			worst, std::fmax(std::fabs(resistance_ohm[i] / known_ohm[i] - 1), std::fabs(capacitance_F[i] / 1e-9 - 1)));
 
 	// A table written as the contract says, owned by C++.
 	std::unique_ptr<tactus_table, decltype(&tactus_table_free)> table(tactus_table_new(), tactus_table_free);
@@ -34,8 +34,8 @@ int main()
 	force_N[0] = 0.1;
 	force_N[1] = 2.5;
 	tactus_writer *writer = nullptr;
-	if (tactus_writer_open(nullptr, TACTUS_FORMAT_CSV, 0, &writer) < 0 ||
-		tactus_writer_rows(writer, table.get()) < 0 || tactus_writer_close(writer) < 0) {
+	if (tactus_writer_open(nullptr, TACTUS_FORMAT_CSV, 0, &writer) < 0 || tactus_writer_rows(writer, table.get()) < 0 ||
+		tactus_writer_close(writer) < 0) {
 		std::fprintf(stderr, "%s\n", tactus_error_message());
 		return 1;
 	}
