@@ -134,6 +134,44 @@ static void the_standard_error_is_that_of_repeated_scans(void **state)
 	assert_in_range((uintmax_t)chi2, 60, 150);
 }
 
+/* The same where each residual is nine tenths of the one before: a white error would be √19 times too small. */
+static void the_standard_error_allows_for_residuals_that_hang_together(void **state)
+{
+	(void)state;
+	double chi2 = 0;
+	for (uint64_t i = 0; i < 100; i++) {
+		tactus_join_result result;
+		uint64_t seed = 1 + i;
+		double rest = noise(&seed);
+		tactus_table *scan = make_scan(press, 1, 0, 1);
+		double *conductance = tactus_table_set_numbers(scan, "conductance_S");
+		for (size_t k = 0; k < tactus_table_rows(scan); k++) {
+			conductance[k] = 1e-6 + 1e-6 * (press((double)k / 20) + rest);
+			rest = 0.9 * rest + sqrt(1 - 0.81) * noise(&seed);
+		}
+		assert_int_equal(join(scan, make_reference(press, 50, 1.5, 0), NULL, &result), TACTUS_OK);
+		double z = (result.offset_s - 1.5) / result.offset_std_s;
+		chi2 += z * z;
+		tactus_table_free(scan);
+	}
+	assert_in_range((uintmax_t)chi2, 60, 150);
+}
+
+static void nothing_is_found_beyond_the_largest_offset(void **state)
+{
+	(void)state;
+	tactus_join_options options = tactus_join_defaults();
+	options.max_offset_s = 2;
+	tactus_join_result result;
+	tactus_table *scan = make_scan(press, 1, 0, 1);
+	assert_int_equal(join(scan, make_reference(press, 50, 2.5, 0), &options, &result), TACTUS_ERR_DATA);
+	assert_non_null(strstr(tactus_error_message(), "beyond the largest offset"));
+	options.max_offset_s = 3;
+	assert_int_equal(join(scan, make_reference(press, 50, 2.5, 0), &options, &result), TACTUS_OK);
+	assert_float_equal(result.offset_s, 2.5, 1e-4);
+	tactus_table_free(scan);
+}
+
 static void a_clock_that_runs_fast_is_found_when_asked_for(void **state)
 {
 	(void)state;
@@ -144,6 +182,10 @@ static void a_clock_that_runs_fast_is_found_when_asked_for(void **state)
 	assert_int_equal(join(scan, make_reference(press, 50, 0.4, 1e-3), &options, &result), TACTUS_OK);
 	assert_float_equal(result.offset_s, 0.4, 5e-4);
 	assert_float_equal(result.drift, 1e-3, 2e-5);
+	const double *time_s = tactus_table_numbers(scan, "time_s"), *force_N = tactus_table_numbers(scan, "force_N");
+	for (size_t i = 0; i < tactus_table_rows(scan); i++)
+		if (!isnan(force_N[i])) /* 5e-4 s at the steepest, 8 N/s */
+			assert_float_equal(force_N[i], press(time_s[i]), 8e-3);
 	tactus_table_free(scan);
 }
 
@@ -228,6 +270,8 @@ int main(void)
 		cmocka_unit_test(an_offset_is_found_to_a_fraction_of_a_sample),
 		cmocka_unit_test(the_force_stands_beside_the_rows_and_nowhere_else),
 		cmocka_unit_test(the_standard_error_is_that_of_repeated_scans),
+		cmocka_unit_test(the_standard_error_allows_for_residuals_that_hang_together),
+		cmocka_unit_test(nothing_is_found_beyond_the_largest_offset),
 		cmocka_unit_test(a_clock_that_runs_fast_is_found_when_asked_for),
 		cmocka_unit_test(a_stated_offset_is_taken_as_it_is),
 		cmocka_unit_test(a_periodic_load_names_its_rival_and_a_limit_settles_it),
