@@ -9,7 +9,11 @@ static const double two_pi = 6.283185307179586;
 
 double sim_round(double value, double resolution)
 {
-	return resolution > 0 ? round(value / resolution) * resolution + 0.0 : value; /* no negative zero */
+	if (!(resolution > 0))
+		return value;
+	/* 0.01 has no exact double, 100 has: 12499/100 is the 124.99 that a display of this resolution shows. */
+	const double per_unit = round(1 / resolution), steps = round(value / resolution) + 0.0; /* no negative zero */
+	return fabs(per_unit * resolution - 1) < 1e-12 ? steps / per_unit : steps * resolution;
 }
 
 double sim_temperature_degC(const tactus_bench *bench, double time_s)
