@@ -187,8 +187,7 @@ static void print_table(const struct cli *cli, FILE *out, const tactus_fit_resul
 		note_channel(cli, tactus_fit_channel_at(result, c));
 }
 
-/* ---- JSON ---------------------------------------------------------------------------------------------------------
- */
+/* ---- JSON ------------------------------------------------------------------------------------------------ */
 
 static void json_figures(struct cli_json *json, const struct figure *figures, size_t n,
 						 const tactus_fit_channel *channel)
@@ -255,8 +254,7 @@ static void json_result(struct cli_json *json, const char *key, const char *name
 	cli_json_close(json);
 }
 
-/* ---- one model, or all --------------------------------------------------------------------------------------------
- */
+/* ---- one model, or all ----------------------------------------------------------------------------------- */
 
 static int report(const struct cli *cli, const char *name, const tactus_fit_result *result)
 {
@@ -281,10 +279,10 @@ static int report(const struct cli *cli, const char *name, const tactus_fit_resu
 	return error ? cli_fail(cli, error) : CLI_OK;
 }
 
-static int fit_one(const struct cli *cli, const tactus_table *recording, const tactus_fit_options *options)
+static int fit_one(const struct cli *cli, const tactus_table *recording, const tactus_fit_options *fit)
 {
 	tactus_fit_result *result;
-	int error = tactus_fit(recording, options, &result);
+	int error = tactus_fit(recording, fit, &result);
 	if (error)
 		return cli_fail(cli, error);
 	const char *name = tactus_metadata_get(tactus_model_provenance((tactus_model *)tactus_fit_model(result)), "model");
@@ -331,7 +329,7 @@ static int print_all(const struct cli *cli, size_t n, const char *const *name, t
 }
 
 /* Every kind of model side by side; what the data cannot support is said, and is no failure while one can. */
-static int fit_all(const struct cli *cli, const tactus_table *recording, tactus_fit_options options)
+static int fit_all(const struct cli *cli, const tactus_table *recording, tactus_fit_options fit)
 {
 	const char *name[MODELS_MAX];
 	tactus_fit_result *result[MODELS_MAX] = {NULL};
@@ -340,8 +338,8 @@ static int fit_all(const struct cli *cli, const tactus_table *recording, tactus_
 	if (cli_has(cli, "output-file"))
 		return cli_error(cli, CLI_USAGE, "--model all compares and writes no model: choose one for -o");
 	for (; n < MODELS_MAX && (name[n] = tactus_fit_model_at(n, NULL)) != NULL; n++) {
-		options.model = name[n];
-		int status = tactus_fit(recording, &options, &result[n]);
+		fit.model = name[n];
+		int status = tactus_fit(recording, &fit, &result[n]);
 		if (status == TACTUS_ERR_DATA || status == TACTUS_ERR_CONVERGENCE)
 			cli_note(cli, "%s: %s", name[n], tactus_error_message());
 		if (status && (!error || status != TACTUS_ERR_DATA))
@@ -357,7 +355,7 @@ static int fit_all(const struct cli *cli, const tactus_table *recording, tactus_
 static int fit_recording(const struct cli *cli, const tactus_table *recording, const tactus_model *start)
 {
 	const char *model = cli_string(cli, "model", NULL);
-	tactus_fit_options options = {
+	tactus_fit_options fit = {
 		.model = model,
 		.effects = cli_string(cli, "effects", NULL),
 		.start = start,
@@ -370,8 +368,8 @@ static int fit_recording(const struct cli *cli, const tactus_table *recording, c
 		.jobs = (int)cli_integer(cli, "jobs", 1),
 	};
 	if (model && strcmp(model, "all") == 0)
-		return fit_all(cli, recording, options);
-	return fit_one(cli, recording, &options);
+		return fit_all(cli, recording, fit);
+	return fit_one(cli, recording, &fit);
 }
 
 static int run(struct cli *cli)

@@ -49,7 +49,7 @@ const char *tactus_fit_model_at(size_t i, const char **summary)
 	return kinds[i].name;
 }
 
-/* ---- the plan ---------------------------------------------------------------------------------------------------- */
+/* ---- the plan -------------------------------------------------------------------------------------------- */
 
 static int find_kind(const char *name, const kind **found)
 {
@@ -135,127 +135,7 @@ static int make_plan(const tactus_fit_options *options, const tactus_series *ser
 	return status == TACTUS_OK ? add_effects(plan, domain, options->effects) : status;
 }
 
-/* ---- what the data cannot support ----------------------------------------------------------------------------------
- */
-
-static size_t parameter_count(const tactus_domain *domain, const tactus_plan *plan)
-{
-	if (plan->form == TACTUS_FORM_LINEAR)
-		return 3;
-	if (plan->form == TACTUS_FORM_NETWORK)
-		return TACTUS_NETWORK_WEIGHTS;
-	return tactus_forward_parameters(domain, plan->effects, plan->effect_count, plan->outputs);
-}
-
-static const char *output_label(const tactus_series *series, size_t o)
-{
-	const char *name = series->output_name[o];
-	return name && name[0] ? name : series->domain->signals[tactus_output_signal(series->domain, o)].name;
-}
-
-static bool wanted(const tactus_plan *plan, const tactus_points *points, size_t p)
-{
-	bool any = false, all = true;
-	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
-		if (!plan->outputs[o])
-			continue;
-		bool there = points->reading[o] && isfinite(points->reading[o][p]);
-		any = any || there;
-		all = all && there;
-	}
-	return isfinite(points->input[p]) && (plan->form == TACTUS_FORM_FORWARD ? any : all);
-}
-
-typedef struct {
-	double low, high, mean, square;
-	size_t n;
-} moments;
-
-static moments moments_of(const double *x, const bool *use, size_t n)
-{
-	moments m = {INFINITY, -INFINITY, 0, 0, 0};
-	for (size_t i = 0; i < n; i++) {
-		if (!use[i] || isnan(x[i]))
-			continue;
-		m.n++;
-		m.low = x[i] < m.low ? x[i] : m.low;
-		m.high = x[i] > m.high ? x[i] : m.high;
-		double from = x[i] - m.mean;
-		m.mean += from / (double)m.n;
-		m.square += from * (x[i] - m.mean);
-	}
-	return m;
-}
-
-/* t of the correlation between force and reading: below three the reading does not follow the force. */
-static double follows(const double *x, const double *y, const bool *use, size_t n)
-{
-	moments mx = moments_of(x, use, n), my = moments_of(y, use, n);
-	double product = 0;
-	size_t count = 0;
-	for (size_t i = 0; i < n; i++) {
-		if (!use[i] || isnan(x[i]) || isnan(y[i]))
-			continue;
-		product += (x[i] - mx.mean) * (y[i] - my.mean);
-		count++;
-	}
-	double r = product / sqrt(mx.square * my.square);
-	return fabs(r) * sqrt((double)(count - 2) / fmax(1 - r * r, 1e-300));
-}
-
-static char *reading_problem(const tactus_series *series, const tactus_points *points, const bool *use, size_t o)
-{
-	char low[TACTUS_NUMBER_SIZE];
-	const char *name = output_label(series, o);
-	if (!series->output_name[o] || !series->output_name[o][0])
-		return tactus_asprintf("the recording has no %s", name);
-	moments m = moments_of(points->reading[o], use, points->n);
-	tactus_format_number(m.low, low);
-	if (m.n == 0)
-		return tactus_asprintf("no usable %s (%zu readings are clipped, wrong-signed or missing)", name,
-							   points->left_out);
-	if (m.low == m.high)
-		return tactus_asprintf("%s is %s in all %zu readings: the channel is %s", name, low, m.n,
-							   m.low == 0 ? "open" : "dead");
-	if (series->domain == &tactus_domain_sensor && follows(points->input, points->reading[o], use, points->n) < 3)
-		return tactus_asprintf("%s does not follow the force: the channel is dead or open", name);
-	return NULL;
-}
-
-/* Why a channel cannot be fitted; NULL if it can. */
-static char *channel_problem(const tactus_plan *plan, const tactus_series *series, const tactus_points *points,
-							 const bool *use)
-{
-	size_t n = 0, needed = 2 * parameter_count(series->domain, plan);
-	for (size_t p = 0; p < points->n; p++)
-		n += use[p];
-	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++)
-		if (plan->outputs[o] && (!series->output_name[o] || !series->output_name[o][0]))
-			return reading_problem(series, points, use, o);
-	if (n < needed)
-		return tactus_asprintf("%zu points are too few: %zu parameters need at least %zu (%zu readings were left out: "
-							   "clipped, wrong-signed or missing)",
-							   n, needed / 2, needed, points->left_out);
-	moments force = moments_of(points->input, use, points->n);
-	char text[TACTUS_NUMBER_SIZE];
-	tactus_format_number(force.mean, text);
-	if (series->domain == &tactus_domain_sensor && !(force.high - force.low > 1e-9 * fabs(force.mean)))
-		return tactus_asprintf("%s never varies: it is %s in all %zu points", series->input_name, text, n);
-	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
-		char *problem = plan->outputs[o] ? reading_problem(series, points, use, o) : NULL;
-		if (problem)
-			return problem;
-	}
-	for (size_t k = 0; k < plan->effect_count; k++) {
-		const char *why = plan->effects[k]->testable(series);
-		if (why)
-			return tactus_asprintf("%s cannot be fitted: %s", plan->effects[k]->name, why);
-	}
-	return NULL;
-}
-
-/* ---- a fit at work ------------------------------------------------------------------------------------------------
- */
+/* ---- a fit at work --------------------------------------------------------------------------------------- */
 
 static void work_free(tactus_work *work)
 {
@@ -292,16 +172,15 @@ static int work_new(tactus_work *work, const tactus_plan *plan, int folds)
 		if (!work->use[c])
 			return status < 0 ? status : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 		for (size_t p = 0; p < points->n; p++)
-			work->use[c][p] = wanted(plan, points, p);
-		work->problem[c] = channel_problem(plan, &work->series[c], points, work->use[c]);
+			work->use[c][p] = tactus_plan_wants(plan, points, p);
+		work->problem[c] = tactus_plan_problem(plan, &work->series[c], points, work->use[c]);
 		if (work->folds[c].count > work->fold_count)
 			work->fold_count = work->folds[c].count;
 	}
 	return TACTUS_OK;
 }
 
-/* ---- the result ----------------------------------------------------------------------------------------------------
- */
+/* ---- the result ------------------------------------------------------------------------------------------ */
 
 static void score_outputs(const tactus_plan *plan, const tactus_points *points, const tactus_outcome *outcome,
 						  tactus_fit_channel *channel)
@@ -320,9 +199,9 @@ static void score_force(const tactus_points *points, const tactus_outcome *own, 
 						const tactus_outcome *capacitance, tactus_fit_channel *channel)
 {
 	size_t n = points->n;
-	const double *reference = own->reference_N;
-	double mse = tactus_mean_square(own->estimate_N, reference, n, &channel->samples);
-	double cv_mse = tactus_mean_square(own->cv_estimate_N, reference, n, NULL);
+	const double *truth = own->reference_N;
+	double mse = tactus_mean_square(own->estimate_N, truth, n, &channel->samples);
+	double cv_mse = tactus_mean_square(own->cv_estimate_N, truth, n, NULL);
 	channel->rmse_N = sqrt(mse);
 	channel->cv_rmse_N = sqrt(cv_mse);
 	if (conductance) {
@@ -339,7 +218,7 @@ static void score_force(const tactus_points *points, const tactus_outcome *own, 
 		channel->cv_bound = tactus_combination_bound(conductance->cv_estimate_N, capacitance->cv_estimate_N,
 													 points->input, n, &ignored);
 	}
-	tactus_static_figures_of(n, points->time_s, reference, own->estimate_N, &channel->figures);
+	tactus_static_figures_of(n, points->time_s, truth, own->estimate_N, &channel->figures);
 }
 
 static tactus_fit_channel blank(int number)
@@ -358,14 +237,14 @@ static void note_calibration(const tactus_work *work, const tactus_plan *plan, s
 							 const tactus_fit_channel *channel, tactus_model_channel_data *data)
 {
 	const tactus_points *points = &work->points[c];
-	moments force = moments_of(points->input, work->use[c], points->n);
+	tactus_moments force = tactus_moments_of(points->input, work->use[c], points->n);
 	data->samples = force.n;
 	data->input_min = force.low;
 	data->input_max = force.high;
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
 		if (!plan->outputs[o])
 			continue;
-		moments m = moments_of(points->reading[o], work->use[c], points->n);
+		tactus_moments m = tactus_moments_of(points->reading[o], work->use[c], points->n);
 		data->output_min[o] = m.low;
 		data->output_max[o] = m.high;
 	}
@@ -464,7 +343,6 @@ static int reference(const tactus_work *work, size_t o, tactus_outcome **outcome
 
 typedef struct {
 	const tactus_plan *plan;
-	const char *name;
 	tactus_outcome *own, *conductance, *capacitance;
 } outcomes;
 
@@ -493,7 +371,7 @@ static int make_result(tactus_work *work, const outcomes *o, tactus_model *model
 		channel->problem = work->problem[c];
 		for (size_t i = 0; i < TACTUS_FIT_OUTPUTS; i++)
 			if (o->plan->outputs[i] && o->plan->form == TACTUS_FORM_FORWARD) {
-				snprintf(r->column[c][i], sizeof r->column[c][i], "%s", output_label(&work->series[c], i));
+				snprintf(r->column[c][i], sizeof r->column[c][i], "%s", tactus_output_label(&work->series[c], i));
 				channel->outputs[i].column = r->column[c][i];
 			}
 		if (channel->problem)
@@ -517,7 +395,7 @@ static int make_result(tactus_work *work, const outcomes *o, tactus_model *model
 
 static int run_work(tactus_work *work, const tactus_plan *plan, const char *name, tactus_fit_result **result)
 {
-	outcomes o = {.plan = plan, .name = name};
+	outcomes o = {.plan = plan};
 	tactus_model *model = NULL;
 	o.own = calloc(work->count, sizeof *o.own);
 	int status = o.own ? none_left(work) : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");

@@ -12,7 +12,7 @@
 #include <mutex>
 
 #include "core/core.h"
-#include "fit/forward_problem.hpp"
+#include "fit/forward_structure.hpp"
 
 namespace
 {
@@ -22,169 +22,7 @@ using Eigen::Index;
 
 const size_t probe_samples = 4096; /* what decides on the structure of a longer recording */
 
-using Columns = Eigen::Ref<const MatrixXd>;
-
-/* Upper triangle R of QR = [parts side by side], taken up in chunks that stay in the cache. */
-MatrixXd triangle(std::initializer_list<Columns> parts)
-{
-	const Index chunk = 512, rows = parts.begin()->rows();
-	Index n = 0;
-	for (const Columns &part : parts)
-		n += part.cols();
-	MatrixXd stack = MatrixXd::Zero(n + chunk, n);
-	for (Index at = 0; at < rows; at += chunk) {
-		const Index m = std::min(chunk, rows - at);
-		Index column = 0;
-		for (const Columns &part : parts) {
-			stack.block(n, column, m, part.cols()) = part.middleRows(at, m);
-			column += part.cols();
-		}
-		stack.bottomRows(chunk - m).setZero();
-		Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(stack);
-		stack.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
-	}
-	return stack.topRows(n);
-}
-
-/* Which parameters are eliminated, which are left to Ceres; the others (fixed) only repeat what these say. */
-struct Structure {
-	std::vector<size_t> linear, nonlinear;
-	std::vector<char> constant;     /* of each linear parameter's column, then of the rest: never changes */
-	std::vector<double> delta;      /* step of each slot that moves the outputs by about their spread */
-	std::vector<char> never_linear; /* per slot */
-	bool may_keep = true;           /* constant columns may be kept */
-};
-
-double step_inside(const Slot &s, double value, double h)
-{
-	return value + h <= s.upper ? value + h : value - h >= s.lower ? value - h : value;
-}
-
-/* ---- the structure --------------------------------------------------------------------------------------------------
- */
-
-class Explorer
-{
-  public:
-	Explorer(ForwardProblem &p, Structure &s) : problem(p), structure(s), start(Index(p.slots.size())), other(start)
-	{
-		for (size_t j = 0; j < p.slots.size(); j++) {
-			const Slot &slot = p.slots[j];
-			start[Index(j)] = slot.start;
-			other[Index(j)] = step_inside(slot, slot.start, 0.37 * slot.scale);
-		}
-	}
-
-	/* Base first. Nothing here is a proof; Solver::confirmed() checks the result. */
-	void explore()
-	{
-		structure.linear.clear();
-		structure.nonlinear.clear();
-		structure.delta.assign(problem.slots.size(), 0);
-		for (size_t j = 0; j < problem.slots.size(); j++) {
-			const bool linear =
-				!structure.never_linear[j] && problem.slots[j].info->kind != TACTUS_SHAPE && find_delta(j) && affine(j);
-			if (!linear)
-				structure.nonlinear.push_back(j);
-			else if (independent(j))
-				structure.linear.push_back(j);
-		}
-		find_constant();
-	}
-
-  private:
-	bool find_delta(size_t j)
-	{
-		VectorXd y0, y1, values = start;
-		double &delta = structure.delta[j];
-		delta = problem.slots[j].scale;
-		if (!problem.simulate(values, y0))
-			return false;
-		for (int pass = 0; pass < 2; pass++) {
-			values[Index(j)] = start[Index(j)] + delta;
-			if (!problem.simulate(values, y1) || !((y1 - y0).norm() > 0))
-				return false;
-			delta *= problem.measured.norm() / (y1 - y0).norm();
-		}
-		return std::isfinite(delta);
-	}
-
-	/* Affine in the linear ones and the candidate together: all second differences vanish to rounding. */
-	bool affine(size_t candidate)
-	{
-		std::vector<size_t> partners = structure.linear;
-		partners.push_back(candidate);
-		VectorXd y0, ya, yb, yab;
-		for (const VectorXd &point : {start, other}) {
-			VectorXd moved = point;
-			moved[Index(candidate)] += structure.delta[candidate];
-			if (!problem.simulate(point, y0) || !problem.simulate(moved, ya))
-				return false;
-			for (size_t partner : partners) {
-				VectorXd single = point, both = moved;
-				single[Index(partner)] += structure.delta[partner];
-				both[Index(partner)] += structure.delta[partner];
-				if (!problem.simulate(single, yb) || !problem.simulate(both, yab))
-					return false;
-				const double size = std::max(y0.lpNorm<Eigen::Infinity>(), yab.lpNorm<Eigen::Infinity>());
-				if ((yab - ya - yb + y0).lpNorm<Eigen::Infinity>() > 1e-11 * size)
-					return false;
-			}
-		}
-		return true;
-	}
-
-	bool column(const VectorXd &point, size_t j, VectorXd &result)
-	{
-		VectorXd y0, moved = point;
-		moved[Index(j)] += structure.delta[j];
-		if (!problem.simulate(point, y0) || !problem.simulate(moved, result))
-			return false;
-		result -= y0;
-		return true;
-	}
-
-	/* False if the candidate's column is a combination of the others': it stays at its start. */
-	bool independent(size_t candidate)
-	{
-		MatrixXd all(problem.measured.size(), Index(structure.linear.size()) + 1);
-		VectorXd y;
-		std::vector<size_t> order = structure.linear;
-		order.push_back(candidate);
-		for (size_t c = 0; c < order.size(); c++) {
-			if (!column(other, order[c], y))
-				return false;
-			all.col(Index(c)) = y;
-		}
-		const MatrixXd r = triangle({all});
-		return std::abs(r(r.rows() - 1, r.cols() - 1)) > 1e-9 * r.col(r.cols() - 1).norm();
-	}
-
-	/* Columns (and the rest) that are the same bits at two unlike points of the nonlinear parameters. */
-	void find_constant()
-	{
-		structure.constant.assign(structure.linear.size() + 1, 0);
-		VectorXd first = start, second = other, a, b;
-		for (size_t l : structure.linear)
-			first[Index(l)] = second[Index(l)] = 0;
-		if (!structure.may_keep || !problem.simulate(first, a) || !problem.simulate(second, b))
-			return;
-		structure.constant.back() = a == b;
-		for (size_t c = 0; c < structure.linear.size() && structure.constant.back(); c++) {
-			const auto at = Index(structure.linear[c]);
-			first[at] = second[at] = structure.delta[structure.linear[c]];
-			structure.constant[c] = problem.simulate(first, a) && problem.simulate(second, b) && a == b;
-			first[at] = second[at] = 0;
-		}
-	}
-
-	ForwardProblem &problem;
-	Structure &structure;
-	VectorXd start, other;
-};
-
-/* ---- the solution ---------------------------------------------------------------------------------------------------
- */
+/* ---- the solution ---------------------------------------------------------------------------------------- */
 
 class Solver
 {
@@ -369,8 +207,7 @@ bool Solver::confirmed()
 			   1e-8 * problem.measured.lpNorm<Eigen::Infinity>();
 }
 
-/* ---- errors ---------------------------------------------------------------------------------------------------------
- */
+/* ---- errors ---------------------------------------------------------------------------------------------- */
 
 /* Lag-one autocorrelation of the residual within outputs, 0 if negative: neighbours say less than they seem to. */
 double autocorrelation(const ForwardProblem &problem, const VectorXd &residual)
@@ -470,7 +307,7 @@ int solve(ForwardProblem &full, ForwardProblem &probe, double *noise)
 	Structure structure;
 	structure.never_linear.assign(full.slots.size(), 0);
 	for (int attempt = 0; attempt < 8; attempt++) {
-		Explorer(probe, structure).explore();
+		explore(probe, structure);
 		if (&probe != &full && full.memoryless())
 			start_from(probe, structure, full);
 		Solver solver(full, structure);

@@ -47,6 +47,21 @@ int tactus_plan_run(const tactus_work *work, const tactus_plan *plan, tactus_mod
 					char **problem);
 void tactus_outcome_free(tactus_outcome *outcome, size_t count);
 
+/* Of the values that are used and not missing; square is the sum about the mean. */
+typedef struct {
+	double low, high, mean, square;
+	size_t n;
+} tactus_moments;
+
+tactus_moments tactus_moments_of(const double *x, const bool *use, size_t n);
+/* The column that plays an output, or the name of the output where none does. */
+const char *tactus_output_label(const tactus_series *series, size_t o);
+/* True if the point has what the plan needs. */
+bool tactus_plan_wants(const tactus_plan *plan, const tactus_points *points, size_t p);
+/* Why a channel cannot be fitted (allocated), NULL if it can. */
+char *tactus_plan_problem(const tactus_plan *plan, const tactus_series *series, const tactus_points *points,
+						  const bool *use);
+
 /* Calls task(context, i) for every i < count on `jobs` threads. */
 void tactus_parallel(int jobs, size_t count, void (*task)(void *context, size_t i), void *context);
 

@@ -196,24 +196,25 @@ static void the_seed_decides_the_starts(void **state)
 static void dc_and_ac_rows_of_a_scan_are_one_point(void **state)
 {
 	(void)state;
-	enum { SCANS = 40 };
+	const size_t scans = 40;
 	for (int ac_first = 0; ac_first < 2; ac_first++) {
-		tactus_table *table = rig_table((size_t)(2 * SCANS));
+		tactus_table *table = rig_table(2 * scans);
 		double *sequence = rig_column(table, "sequence"), *force = rig_column(table, "force_N");
 		double *g = rig_column(table, "conductance_S"), *c = rig_column(table, "capacitance_F");
 		tactus_text *mode = tactus_table_set_texts(table, "mode");
 		uint64_t seed = 1;
-		for (size_t i = 0; i < 2 * SCANS; i++) {
+		for (size_t i = 0; i < 2 * scans; i++) {
 			bool ac = (i % 2 == 1) != ac_first;
 			mode[i] = ac ? (tactus_text){"ac", 2} : (tactus_text){"dc", 2};
-			sequence[i] = (double)(i / 2 + (i >= SCANS ? 3 : 0)); /* three scans were lost */
-			force[i] = 5 * (double)(i / 2) + (double)(i % 2);
+			size_t scan = i / 2;
+			sequence[i] = (double)(scan + (i >= scans ? 3 : 0)); /* three scans were lost */
+			force[i] = 5 * (double)scan + (double)(i % 2);
 			g[i] = ac ? 77 : 4e-6 * force[i] + 1e-7 * rig_noise(&seed); /* an ac row's conductance is not used */
 			c[i] = ac ? 1e-10 + 3e-12 * force[i] + 1e-13 * rig_noise(&seed) : NAN;
 		}
 		tactus_fit_result *result = rig_fit(table, &(tactus_fit_options){.model = "average"});
 		const tactus_fit_channel *channel = tactus_fit_channel_at(result, 0);
-		assert_int_equal(channel->samples, SCANS);
+		assert_int_equal(channel->samples, scans);
 		/* Each row has its own load: the slopes are those of the rows, and the mean force that of the pair. */
 		rig_near(rig_parameter(result, 0, "", "g1").value, 4e-6, 4e-10);
 		rig_near(rig_parameter(result, 0, "", "c1").value, 3e-12, 3e-16);

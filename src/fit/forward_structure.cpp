@@ -1,0 +1,168 @@
+/* The structure of a forward model, found by running the chain: second differences, dependent and constant columns. */
+#include "fit/forward_structure.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tactus
+{
+
+using Eigen::Index;
+
+MatrixXd triangle(std::initializer_list<Columns> parts)
+{
+	const Index chunk = 512, rows = parts.begin()->rows();
+	Index n = 0;
+	for (const Columns &part : parts)
+		n += part.cols();
+	MatrixXd stack = MatrixXd::Zero(n + chunk, n);
+	for (Index at = 0; at < rows; at += chunk) {
+		const Index m = std::min(chunk, rows - at);
+		Index column = 0;
+		for (const Columns &part : parts) {
+			stack.block(n, column, m, part.cols()) = part.middleRows(at, m);
+			column += part.cols();
+		}
+		stack.bottomRows(chunk - m).setZero();
+		Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(stack);
+		stack.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
+	}
+	return stack.topRows(n);
+}
+
+double step_inside(const Slot &s, double value, double h)
+{
+	return value + h <= s.upper ? value + h : value - h >= s.lower ? value - h : value;
+}
+
+namespace
+{
+
+class Explorer
+{
+  public:
+	Explorer(ForwardProblem &p, Structure &s) : problem(p), structure(s), start(Index(p.slots.size())), other(start)
+	{
+		for (size_t j = 0; j < p.slots.size(); j++) {
+			const Slot &slot = p.slots[j];
+			start[Index(j)] = slot.start;
+			other[Index(j)] = step_inside(slot, slot.start, 0.37 * slot.scale);
+		}
+	}
+
+	/* Base first. Nothing here is a proof; Solver::confirmed() checks the result. */
+	void explore()
+	{
+		structure.linear.clear();
+		structure.nonlinear.clear();
+		structure.delta.assign(problem.slots.size(), 0);
+		for (size_t j = 0; j < problem.slots.size(); j++) {
+			const bool linear =
+				!structure.never_linear[j] && problem.slots[j].info->kind != TACTUS_SHAPE && find_delta(j) && affine(j);
+			if (!linear)
+				structure.nonlinear.push_back(j);
+			else if (independent(j))
+				structure.linear.push_back(j);
+		}
+		find_constant();
+	}
+
+  private:
+	bool find_delta(size_t j)
+	{
+		VectorXd y0, y1, values = start;
+		double &delta = structure.delta[j];
+		delta = problem.slots[j].scale;
+		if (!problem.simulate(values, y0))
+			return false;
+		for (int pass = 0; pass < 2; pass++) {
+			values[Index(j)] = start[Index(j)] + delta;
+			if (!problem.simulate(values, y1) || !((y1 - y0).norm() > 0))
+				return false;
+			delta *= problem.measured.norm() / (y1 - y0).norm();
+		}
+		return std::isfinite(delta);
+	}
+
+	/* Affine in the linear ones and the candidate together: all second differences vanish to rounding. */
+	bool affine(size_t candidate)
+	{
+		std::vector<size_t> partners = structure.linear;
+		partners.push_back(candidate);
+		VectorXd y0, ya, yb, yab;
+		for (const VectorXd &point : {start, other}) {
+			VectorXd moved = point;
+			moved[Index(candidate)] += structure.delta[candidate];
+			if (!problem.simulate(point, y0) || !problem.simulate(moved, ya))
+				return false;
+			for (size_t partner : partners) {
+				VectorXd single = point, both = moved;
+				single[Index(partner)] += structure.delta[partner];
+				both[Index(partner)] += structure.delta[partner];
+				if (!problem.simulate(single, yb) || !problem.simulate(both, yab))
+					return false;
+				const double size = std::max(y0.lpNorm<Eigen::Infinity>(), yab.lpNorm<Eigen::Infinity>());
+				if ((yab - ya - yb + y0).lpNorm<Eigen::Infinity>() > 1e-11 * size)
+					return false;
+			}
+		}
+		return true;
+	}
+
+	bool column(const VectorXd &point, size_t j, VectorXd &result)
+	{
+		VectorXd y0, moved = point;
+		moved[Index(j)] += structure.delta[j];
+		if (!problem.simulate(point, y0) || !problem.simulate(moved, result))
+			return false;
+		result -= y0;
+		return true;
+	}
+
+	/* False if the candidate's column is a combination of the others': it stays at its start. */
+	bool independent(size_t candidate)
+	{
+		MatrixXd all(problem.measured.size(), Index(structure.linear.size()) + 1);
+		VectorXd y;
+		std::vector<size_t> order = structure.linear;
+		order.push_back(candidate);
+		for (size_t c = 0; c < order.size(); c++) {
+			if (!column(other, order[c], y))
+				return false;
+			all.col(Index(c)) = y;
+		}
+		const MatrixXd r = triangle({all});
+		return std::abs(r(r.rows() - 1, r.cols() - 1)) > 1e-9 * r.col(r.cols() - 1).norm();
+	}
+
+	/* Columns (and the rest) that are the same bits at two unlike points of the nonlinear parameters. */
+	void find_constant()
+	{
+		structure.constant.assign(structure.linear.size() + 1, 0);
+		VectorXd first = start, second = other, a, b;
+		for (size_t l : structure.linear)
+			first[Index(l)] = second[Index(l)] = 0;
+		if (!structure.may_keep || !problem.simulate(first, a) || !problem.simulate(second, b))
+			return;
+		structure.constant.back() = a == b;
+		for (size_t c = 0; c < structure.linear.size() && structure.constant.back(); c++) {
+			const auto at = Index(structure.linear[c]);
+			first[at] = second[at] = structure.delta[structure.linear[c]];
+			structure.constant[c] = problem.simulate(first, a) && problem.simulate(second, b) && a == b;
+			first[at] = second[at] = 0;
+		}
+	}
+
+	ForwardProblem &problem;
+	Structure &structure;
+	VectorXd start, other;
+};
+
+} // namespace
+
+void explore(ForwardProblem &problem, Structure &structure)
+{
+	Explorer(problem, structure).explore();
+}
+
+} // namespace tactus
