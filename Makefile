@@ -220,7 +220,7 @@ check-scripts:
 	@shellcheck $(SCRIPTS)
 
 # One mark per file, so that an unchanged file is not read again.
-TIDY := $(SOURCES_C:%=$(BUILD)/tidy/%) $(LIB_CXX:%=$(BUILD)/tidy/%)
+TIDY := $(LIB_CXX:%=$(BUILD)/tidy/%) $(SOURCES_C:%=$(BUILD)/tidy/%)
 .PHONY: check-tidy
 check-tidy: $(TIDY)
 
@@ -230,9 +230,10 @@ $(BUILD)/tidy/%.c: %.c $(TIDY_DEPENDS)
 	$(call say,TIDY)clang-tidy --quiet $< -- -std=c17 $(CPPFLAGS_ALL) $(LIB_CFLAGS) -Icli -Wall -Wextra 2>$@.log || { cat $@.log; exit 1; }
 	@touch $@
 
+# Without the path-sensitive analyser: on the templates of Eigen and Ceres it takes minutes and finds nothing of ours.
 $(BUILD)/tidy/%.cpp: %.cpp $(TIDY_DEPENDS)
 	@mkdir -p $(@D)
-	$(call say,TIDY)clang-tidy --quiet $< -- -std=c++17 $(CPPFLAGS_ALL) $(LIB_CXXFLAGS) -Wall -Wextra 2>$@.log || { cat $@.log; exit 1; }
+	$(call say,TIDY)clang-tidy --quiet --checks='-clang-analyzer-*' $< -- -std=c++17 $(CPPFLAGS_ALL) $(LIB_CXXFLAGS) -Wall -Wextra 2>$@.log || { cat $@.log; exit 1; }
 	@touch $@
 
 .PHONY: check-cppcheck

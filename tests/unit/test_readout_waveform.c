@@ -122,7 +122,7 @@ static void a_scan_gives_the_loads_of_its_channels(void **state)
 	for (size_t i = 0; i < n; i++) {
 		expect_load(&readings[i], (int)(i % CHANNELS), 1e-11);
 		rig_near(readings[i].value[DRIVE], drive_peak, 1e-12);
-		assert_true(readings[i].value[SEQUENCE] == (double)(i / CHANNELS));
+		assert_int_equal((size_t)readings[i].value[SEQUENCE], i / CHANNELS);
 		assert_int_equal(readings[i].quality, TACTUS_QUALITY_OK);
 	}
 	/* The middle of samples 1060 + 440 … 2119. */
@@ -207,7 +207,7 @@ static void a_channel_column_overrides_the_schedule(void **state)
 	assert_int_equal(n, 16);
 	for (size_t i = 0; i < n; i++) {
 		expect_load(&readings[i], (int)(i % CHANNELS), 1e-11);
-		assert_true(readings[i].value[SEQUENCE] == (double)(i / CHANNELS));
+		assert_int_equal((size_t)readings[i].value[SEQUENCE], i / CHANNELS);
 	}
 	w.dwell_s = 2.65e-3; /* two readings to each stay */
 	w.settle_s = 0;
