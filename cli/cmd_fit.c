@@ -187,7 +187,7 @@ static void print_table(const struct cli *cli, FILE *out, const tactus_fit_resul
 		note_channel(cli, tactus_fit_channel_at(result, c));
 }
 
-/* ---- JSON ------------------------------------------------------------------------------------------------ */
+/* ---- JSON ---- */
 
 static void json_figures(struct cli_json *json, const struct figure *figures, size_t n,
 						 const tactus_fit_channel *channel)
@@ -254,7 +254,7 @@ static void json_result(struct cli_json *json, const char *key, const char *name
 	cli_json_close(json);
 }
 
-/* ---- one model, or all ----------------------------------------------------------------------------------- */
+/* ---- one model, or all ---- */
 
 static int report(const struct cli *cli, const char *name, const tactus_fit_result *result)
 {

@@ -37,8 +37,7 @@ static double clock_s(void)
 	return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* ---- settings ------------------------------------------------------------------------------------------------------
- */
+/* ---- settings ---- */
 
 static unsigned modes(const char *text)
 {
@@ -78,8 +77,7 @@ static int max_lost(const struct cli *cli, double *share)
 	return 0;
 }
 
-/* ---- continuing a recording ----------------------------------------------------------------------------------------
- */
+/* ---- continuing a recording ---- */
 
 /* The end of the recording that is there: the next scan begins on the next tick of its rate. */
 static int find_end(struct scan *scan, tactus_reader *reader)
@@ -126,8 +124,7 @@ static int open_writer(struct scan *scan)
 									  json ? TACTUS_FORMAT_JSON_LINES : TACTUS_FORMAT_CSV, flags, &scan->writer);
 }
 
-/* ---- from readings to records --------------------------------------------------------------------------------------
- */
+/* ---- from readings to records ---- */
 
 /* The contract's order of the columns; what is not there yet is filled by the device, the converter, the estimator. */
 static int make_columns(struct scan *scan)
@@ -259,8 +256,7 @@ static int put(struct scan *scan, tactus_reading *readings, size_t n, bool first
 	return error ? error : tactus_writer_flush(scan->writer);
 }
 
-/* ---- acquiring -----------------------------------------------------------------------------------------------------
- */
+/* ---- acquiring ---- */
 
 /* One line on a terminal, ten times a second at most, that overwrites itself. */
 static void show_progress(struct scan *scan, double since_s, bool end)
@@ -332,8 +328,7 @@ static int acquire(struct scan *scan)
 	return error;
 }
 
-/* ---- the command ----------------------------------------------------------------------------------------------------
- */
+/* ---- the command ---- */
 
 /* More scans lost than are allowed is a failure, even though what came is kept. */
 static int check_lost(const struct scan *scan, double share)

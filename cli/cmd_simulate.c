@@ -76,8 +76,7 @@ static int over_recording(const struct cli *cli, const tactus_model *model, uint
 	return status;
 }
 
-/* ---- inputs from a protocol ----------------------------------------------------------------------------------------
- */
+/* ---- inputs from a protocol ---- */
 
 struct loading {
 	tactus_protocol *protocol;

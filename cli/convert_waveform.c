@@ -21,8 +21,7 @@ struct waveform {
 	uint64_t lost; /* samples */
 };
 
-/* ---- common to all inputs ------------------------------------------------------------------------------------------
- */
+/* ---- common to all inputs ---- */
 
 /* The command line's value, else the metadata's, else *value as it was. */
 static int settle(const struct waveform *w, const char *option, const char *key, double *value)
@@ -145,8 +144,7 @@ static int end(struct waveform *w, int status)
 	return status;
 }
 
-/* ---- CSV: sample_V, drive_sample_V, time_s, channel ----------------------------------------------------------------
- */
+/* ---- CSV: sample_V, drive_sample_V, time_s, channel ---- */
 
 enum { SAMPLE, DRIVE, CHANNEL, TIME, COLUMNS };
 static const char *const column_names[COLUMNS] = {"sample_V", "drive_sample_V", "channel", "time_s"};
@@ -308,8 +306,7 @@ static int convert_csv(struct waveform *w)
 	return status;
 }
 
-/* ---- binary: little-endian int16 or float32, output alone or output and drive in turn
- * -------------------------------- */
+/* ---- binary: little-endian int16 or float32, output alone or output and drive in turn ---- */
 
 static double int16_at(const unsigned char *bytes)
 {

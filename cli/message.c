@@ -23,8 +23,7 @@ const struct cli_status cli_statuses[] = {
 	{NULL, NULL},
 };
 
-/* ---- messages ------------------------------------------------------------------------------------------------------
- */
+/* ---- messages ---- */
 
 bool cli_colour(FILE *stream)
 {
@@ -98,8 +97,7 @@ int cli_fail(const struct cli *cli, int error)
 	return i < sizeof statuses / sizeof *statuses ? statuses[i] : CLI_FAILED;
 }
 
-/* ---- the nearest word
- * ------------------------------------------------------------------------------------------------ */
+/* ---- the nearest word ---- */
 
 /* Edits (insert, delete, replace, swap neighbours) that turn a into b; words longer than the table are far. */
 static size_t edits(const char *a, size_t m, const char *b, size_t n)
@@ -145,8 +143,7 @@ const char *cli_did_you_mean(const struct cli_nearest *nearest)
 	return text;
 }
 
-/* ---- signals and the end
- * ----------------------------------------------------------------------------------------------- */
+/* ---- signals and the end ---- */
 
 /* The second one, of either kind, finds the default action again and ends the program at once. */
 static void on_signal(int number)

@@ -46,7 +46,7 @@ static int try_help(const struct cli *cli)
 	return CLI_USAGE;
 }
 
-/* ---- values ------------------------------------------------------------------------------------------------------ */
+/* ---- values ---- */
 
 static bool is_choice(const char *choices, const char *text, struct cli_nearest *nearest)
 {
@@ -104,7 +104,7 @@ static int check_value(const struct cli *cli, const struct cli_option *option, s
 	return 0;
 }
 
-/* ---- getopt ------------------------------------------------------------------------------------------------------ */
+/* ---- getopt ---- */
 
 struct spelling {
 	struct option *longs;
@@ -234,8 +234,7 @@ int cli_parse(struct cli *cli, const struct cli_command *command, int argc, char
 	return status;
 }
 
-/* ---- what commands ask ---------------------------------------------------------------------------------------------
- */
+/* ---- what commands ask ---- */
 
 static const struct cli_value *value_of(const struct cli *cli, const char *name)
 {

@@ -19,8 +19,7 @@ const char *cli_value_text(double value, double standard_error, const char *unit
 	return text;
 }
 
-/* ---- text
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- text ---- */
 
 static void print_readings(const tactus_model *model)
 {
@@ -120,8 +119,7 @@ static void print_model(const tactus_model *model, const char *file)
 	print_metadata(provenance);
 }
 
-/* ---- JSON
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- JSON ---- */
 
 static void json_range(struct cli_json *json, const char *key, double minimum, double maximum)
 {

@@ -49,8 +49,7 @@ struct recording {
 	struct clock clock;
 };
 
-/* ---- gathering
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- gathering ---- */
 
 static void add_numbers(struct column *column, const double *values, size_t n)
 {
@@ -211,8 +210,7 @@ static int gather(tactus_reader *reader, struct recording *recording)
 	return error;
 }
 
-/* ---- the clock
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- the clock ---- */
 
 struct rhythm {
 	double start_s, end_s, step_s, rate_Hz, largest_step_s;
@@ -247,8 +245,7 @@ static struct rhythm find_rhythm(struct clock *clock)
 	return rhythm;
 }
 
-/* ---- text
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- text ---- */
 
 static void print_columns(const struct recording *recording)
 {
@@ -302,8 +299,7 @@ static void print_recording(const struct recording *recording, const struct rhyt
 		printf("  %-28s %s\n", tactus_metadata_key(metadata, i), tactus_metadata_value(metadata, i));
 }
 
-/* ---- JSON
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- JSON ---- */
 
 static void json_column(struct cli_json *json, const struct column *column)
 {

@@ -15,7 +15,7 @@
 extern "C" {
 #endif
 
-/* ---- protocols: what load is applied, and when ------------------------------------------------------------------ */
+/* ---- protocols: what load is applied, and when ---- */
 
 typedef struct tactus_protocol tactus_protocol;
 
@@ -31,8 +31,7 @@ TACTUS_API double tactus_protocol_force_N(const tactus_protocol *protocol, doubl
 /** Largest load of the whole protocol. */
 TACTUS_API double tactus_protocol_maximum_N(const tactus_protocol *protocol);
 
-/* ---- devices ------------------------------------------------------------------------------------------------------
- */
+/* ---- devices ---- */
 
 typedef struct tactus_device tactus_device;
 
@@ -93,8 +92,7 @@ TACTUS_API uint64_t tactus_device_expected_scans(const tactus_device *device);
 TACTUS_API int tactus_device_list(bool (*found)(void *context, const char *uri, const char *description),
 								  void *context);
 
-/* ---- benches ------------------------------------------------------------------------------------------------------
- */
+/* ---- benches ---- */
 
 /** True for a "sim:" URI and for a bench file. */
 TACTUS_API bool tactus_bench_is(const char *path);

@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-/* ---- the catalogue ----------------------------------------------------------------------------------------------- */
+/* ---- the catalogue ---- */
 
 typedef struct tactus_domain tactus_domain;
 typedef struct tactus_effect tactus_effect;
@@ -50,8 +50,7 @@ TACTUS_API const char *tactus_effect_confused_with(const tactus_effect *effect);
 TACTUS_API size_t tactus_effect_parameters(const tactus_effect *effect);
 TACTUS_API tactus_parameter_info tactus_effect_parameter(const tactus_effect *effect, size_t i);
 
-/* ---- models -------------------------------------------------------------------------------------------------------
- */
+/* ---- models ---- */
 
 typedef struct tactus_model tactus_model;
 
@@ -123,8 +122,7 @@ typedef struct {
 TACTUS_API size_t tactus_model_readings(const tactus_model *model);
 TACTUS_API tactus_reading_facts tactus_model_reading(const tactus_model *model, size_t channel_index, size_t i);
 
-/* ---- simulate: inputs → outputs, block by block --------------------------------------------------------------------
- */
+/* ---- simulate: inputs → outputs, block by block ---- */
 
 /**
  * True if the model couples channels or looks ahead in time: neighbours' loads and later samples are looked up in the
@@ -141,8 +139,7 @@ TACTUS_API void tactus_simulator_free(tactus_simulator *simulator);
 /** Fills or replaces the output columns of a block; rows of channels that the model has not are left empty. */
 TACTUS_API int tactus_simulator_block(tactus_simulator *simulator, tactus_table *block);
 
-/* ---- estimate: readings → force, block by block or one by one -------------------------------------------------------
- */
+/* ---- estimate: readings → force, block by block or one by one ---- */
 
 typedef struct tactus_estimator tactus_estimator;
 

@@ -84,7 +84,7 @@ TACTUS_API void tactus_readout_forward(double gain_resistor_ohm, double drive_V,
 									   double resistance_ohm, double capacitance_F, double *amplitude_V,
 									   double *phase_rad);
 
-/* ---- the detectors: what the ADC sees (Paredes-Madrid 2010, fig. 7) -------------------------------------------- */
+/* ---- the detectors: what the ADC sees (Paredes-Madrid 2010, fig. 7) ---- */
 
 /** Scale and polarity of the detectors; written to and read from a recording's metadata (`# detector_…: …`). */
 typedef struct {
@@ -105,7 +105,7 @@ TACTUS_API double tactus_detectors_amplitude(const tactus_detectors *detectors, 
 TACTUS_API double tactus_detectors_phase(const tactus_detectors *detectors, double detector_phase_V);
 TACTUS_API double tactus_detectors_dc(const tactus_detectors *detectors, double detector_dc_V);
 
-/* ---- a stream of readings --------------------------------------------------------------------------------------- */
+/* ---- a stream of readings ---- */
 
 typedef struct tactus_converter tactus_converter;
 
@@ -136,7 +136,7 @@ TACTUS_API void tactus_converter_free(tactus_converter *converter);
  */
 TACTUS_API int tactus_converter_block(tactus_converter *converter, tactus_table *block);
 
-/* ---- software lock-in ------------------------------------------------------------------------------------------- */
+/* ---- software lock-in ---- */
 
 /**
  * In-phase and quadrature means of n samples against cos and sin of 2π·frequency·t, least squares over {cos, sin, 1},
@@ -149,7 +149,7 @@ TACTUS_API int tactus_lockin_block(const double *samples_V, size_t n, double rat
 TACTUS_API int tactus_lockin_block_f32(const float *samples_V, size_t n, double rate_Hz, double frequency_Hz,
 									   double *amplitude_V, double *phase_rad, double *offset_V);
 
-/* ---- a stream of raw samples, demodulated ----------------------------------------------------------------------- */
+/* ---- a stream of raw samples, demodulated ---- */
 
 /** How the samples were taken. A scan's channels follow each other, each for dwell_s, of which settle_s is discarded.
  */

@@ -34,7 +34,7 @@ TACTUS_API size_t tactus_metadata_count(const tactus_metadata *metadata);
 TACTUS_API const char *tactus_metadata_key(const tactus_metadata *metadata, size_t i);
 TACTUS_API const char *tactus_metadata_value(const tactus_metadata *metadata, size_t i);
 
-/* ---- tables: a recording, or a block of one, in columns ------------------------------------------------------ */
+/* ---- tables: a recording, or a block of one, in columns ---- */
 
 typedef struct tactus_table tactus_table;
 
@@ -81,7 +81,7 @@ TACTUS_API tactus_text *tactus_table_set_texts(tactus_table *table, const char *
 /** Removes a column if it is there. */
 TACTUS_API void tactus_table_remove(tactus_table *table, const char *name);
 
-/* ---- reading -------------------------------------------------------------------------------------------------- */
+/* ---- reading ---- */
 
 typedef struct tactus_reader tactus_reader;
 
@@ -118,7 +118,7 @@ TACTUS_API bool tactus_reader_ready(tactus_reader *reader);
 /** A whole recording at once; the caller frees the table. TACTUS_ERR_DATA if it has a header and no rows. */
 TACTUS_API int tactus_table_read(const char *path, const tactus_read_options *options, tactus_table **table);
 
-/* ---- writing -------------------------------------------------------------------------------------------------- */
+/* ---- writing ---- */
 
 typedef struct tactus_writer tactus_writer;
 
@@ -146,7 +146,7 @@ TACTUS_API int tactus_writer_close(tactus_writer *writer);
 /** Frees the handle and removes what was written beside (an in-place file is kept). */
 TACTUS_API void tactus_writer_abort(tactus_writer *writer);
 
-/* ---- numbers -------------------------------------------------------------------------------------------------- */
+/* ---- numbers ---- */
 
 enum { TACTUS_NUMBER_SIZE = 32 };
 

@@ -15,8 +15,7 @@ enum { GRID_MAX = 1 << 17, OVERLAP_MIN = 8, FINE_STEPS = 16, ITERATIONS = 50 };
 #define CORRELATION_MIN 0.5 /* below it no reading can be said to follow the reference */
 #define RIVAL_SHARE 0.9     /* another offset with this share of the best one's score is reported */
 
-/* ---- all lags of a common grid
- * ---------------------------------------------------------------------------------------- */
+/* ---- all lags of a common grid ---- */
 
 /* A track on a grid from its first sample on: normalised values, 0 where none is, and a mask. */
 struct grid {
@@ -189,8 +188,7 @@ static int search_grid(const tactus_track *tracks, size_t n, const tactus_track 
 	return error;
 }
 
-/* ---- between the points of the grid
- * ------------------------------------------------------------------------------------- */
+/* ---- between the points of the grid ---- */
 
 /* Offset and drift, with what they are measured from. */
 struct clocks {
@@ -387,8 +385,7 @@ static void refine(const tactus_track *tracks, size_t n, const tactus_track *ref
 	}
 }
 
-/* ---- both
- * -------------------------------------------------------------------------------------------------------------- */
+/* ---- both ---- */
 
 static double first_of(const tactus_track *tracks, size_t n)
 {

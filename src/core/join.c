@@ -21,8 +21,7 @@ tactus_join_options tactus_join_defaults(void)
 	return (tactus_join_options){.offset_s = NAN, .max_offset_s = NAN};
 }
 
-/* ---- tracks ---------------------------------------------------------------------------------------------------------
- */
+/* ---- tracks ---- */
 
 double tactus_track_value(const tactus_track *track, double time_s, size_t *at)
 {
@@ -114,8 +113,7 @@ static int read_reference(const tactus_table *table, const char *column, tactus_
 	return error;
 }
 
-/* ---- the scan's readings --------------------------------------------------------------------------------------------
- */
+/* ---- the scan's readings ---- */
 
 static const char *find_reading(const tactus_table *scan, const char *stated, int *sign)
 {
@@ -207,8 +205,7 @@ static int find_offset(const tactus_table *scan, const tactus_track *reference, 
 	return error;
 }
 
-/* ---- the force beside the rows --------------------------------------------------------------------------------------
- */
+/* ---- the force beside the rows ---- */
 
 static double first_time(const tactus_table *scan)
 {

@@ -18,7 +18,7 @@ const char *tactus_builtin_find(const char *name)
 	return NULL;
 }
 
-/* ---- sections: a table of keys, each a number within bounds or a truth value ------------------------------------- */
+/* ---- sections: a table of keys, each a number within bounds or a truth value ---- */
 
 #define POSITIVE 1e-300, INFINITY
 #define NOT_NEGATIVE 0, INFINITY
@@ -108,7 +108,7 @@ static int read_sections(const tactus_toml_node *root, tactus_bench *bench)
 	return TACTUS_OK;
 }
 
-/* ---- the rest --------------------------------------------------------------------------------------------------- */
+/* ---- the rest ---- */
 
 static int read_text(const tactus_toml_node *table, const char *key, char **text)
 {

@@ -29,7 +29,7 @@ bool tactus_bench_is(const char *path)
 	return is;
 }
 
-/* ---- as a model ------------------------------------------------------------------------------------------------- */
+/* ---- as a model ---- */
 
 static int add_effects(const tactus_bench_sensor *sensor, tactus_model *model)
 {
@@ -101,7 +101,7 @@ int tactus_bench_model(const char *name, tactus_model **result)
 	return TACTUS_OK;
 }
 
-/* ---- in words --------------------------------------------------------------------------------------------------- */
+/* ---- in words ---- */
 
 static int describe(const tactus_bench *bench, tactus_metadata *facts)
 {

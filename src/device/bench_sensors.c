@@ -102,8 +102,7 @@ int tactus_bench_read_sensors(const tactus_toml_node *root, tactus_bench *bench)
 	return status;
 }
 
-/* ---- effects ------------------------------------------------------------------------------------------------------
- */
+/* ---- effects ---- */
 
 /* Puts an effect where its stage belongs, behind those of the same stage; replaces one that an earlier file set. */
 static tactus_bench_effect *place(tactus_bench_effects *effects, const tactus_effect *effect, int file)

@@ -30,8 +30,7 @@ static int check_load(const tactus_load *load)
 	return (isnan(load->resistance_ohm) || load->resistance_ohm > 0) && load->capacitance_F >= 0;
 }
 
-/* ---- TOML -----------------------------------------------------------------------------------------------------------
- */
+/* ---- TOML ---- */
 
 static int read_numbers(const tactus_toml_node *root, const char *key, double **numbers, size_t *count)
 {
@@ -94,8 +93,7 @@ static int read_toml(const tactus_toml *document, tactus_loads *loads)
 	return status < 0 ? status : tactus_toml_check_unknown(document);
 }
 
-/* ---- a recording
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- a recording ---- */
 
 /* The different values of a column, in the order of their first appearance. */
 static int distinct(const double *column, size_t n, double **values, size_t *count)
@@ -174,8 +172,7 @@ int tactus_loads_open(const char *name, tactus_loads **result)
 	return TACTUS_OK;
 }
 
-/* ---- the plan
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- the plan ---- */
 
 static size_t at_least_one(size_t n)
 {

@@ -17,8 +17,7 @@
 
 enum { BLOCK_SCANS = 64, BLOCK_FIELDS = 11 };
 
-/* ---- start and close ------------------------------------------------------------------------------------------------
- */
+/* ---- start and close ---- */
 
 static void free_scan(tactus_sim *sim)
 {
@@ -187,8 +186,7 @@ static bool sim_list(bool (*found)(void *context, const char *uri, const char *d
 	return true;
 }
 
-/* ---- a block of scans
- * ------------------------------------------------------------------------------------------------ */
+/* ---- a block of scans ---- */
 
 /* What the instruments beside the sensors give: the reference on the row's channel, the thermometer. */
 static void read_instruments(tactus_sim *sim, const tactus_bench_sensor *sensor, uint64_t number, double time_s,

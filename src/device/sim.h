@@ -22,8 +22,7 @@ typedef struct {
 	tactus_reading *readings;        /* what the device gives */
 } sim_block;
 
-/* ---- press and thermometer: sim_press.c ----------------------------------------------------------------------------
- */
+/* ---- press and thermometer: sim_press.c ---- */
 
 enum { PRESS_TICKS = 2048 }; /* of the motor's past, 1 ms each: covers the reference's latency and one reading */
 
@@ -44,8 +43,7 @@ double sim_temperature_degC(const tactus_bench *bench, double time_s);
 /* A value as an instrument of that resolution gives it; resolution 0: as it is. */
 double sim_round(double value, double resolution);
 
-/* ---- sensors: sim_sensors.c ----------------------------------------------------------------------------------------
- */
+/* ---- sensors: sim_sensors.c ---- */
 
 typedef struct {
 	double load_N, conductance_S, capacitance_F;
@@ -69,8 +67,7 @@ int sim_sensor_run(sim_sensor *sensor, sim_block *block, size_t first, size_t ru
 /* Doubles of scratch that it needs for n readings. */
 size_t sim_sensor_scratch(size_t n);
 
-/* ---- electronics: sim_electronics.c --------------------------------------------------------------------------------
- */
+/* ---- electronics: sim_electronics.c ---- */
 
 enum { SIM_AMPLITUDE, SIM_PHASE, SIM_DC, SIM_FILTERS };
 
@@ -107,8 +104,7 @@ int sim_electronics_run(sim_electronics *electronics, sim_block *block, size_t c
 /* Detectors, ADC and what is known of the circuit, as a recording says them. */
 int sim_electronics_metadata(const tactus_bench *bench, unsigned modes, tactus_metadata *metadata);
 
-/* ---- a scan: sim.c and sim_settings.c
- * -------------------------------------------------------------------------------- */
+/* ---- a scan: sim.c and sim_settings.c ---- */
 
 #define SIM_TICKS_PER_S 1e6 /* of the bench's timer, which starts scans and stamps readings */
 

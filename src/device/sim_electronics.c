@@ -13,7 +13,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* ---- effects: those of the file, and the switches' known resistance and the leads' known capacitance ------------- */
+/* ---- effects: those of the file, and the switches' known resistance and the leads' known capacitance ---- */
 
 enum { EFFECTS_MAX = 4 * TACTUS_BENCH_EFFECTS_MAX };
 
@@ -142,8 +142,7 @@ static int run_chain(sim_electronics *e, sim_block *block, size_t channel_count,
 	return code;
 }
 
-/* ---- detectors -----------------------------------------------------------------------------------------------------
- */
+/* ---- detectors ---- */
 
 double sim_window_s(const tactus_bench *bench, double frequency_Hz)
 {
@@ -253,8 +252,7 @@ static void settle(sim_electronics *e, const tactus_reading *reading, const doub
 	e->free_s = begin_s + e->settle_s + window_s;
 }
 
-/* ---- converter -----------------------------------------------------------------------------------------------------
- */
+/* ---- converter ---- */
 
 static double adc_step_V(const tactus_bench *bench)
 {
@@ -297,8 +295,7 @@ int sim_electronics_run(sim_electronics *e, sim_block *block, size_t channel_cou
 	return code;
 }
 
-/* ---- what is known -------------------------------------------------------------------------------------------------
- */
+/* ---- what is known ---- */
 
 int sim_electronics_metadata(const tactus_bench *bench, unsigned modes, tactus_metadata *metadata)
 {

@@ -4,8 +4,7 @@
 #include "core/core.h"
 #include "device/sim.h"
 
-/* ---- settings ------------------------------------------------------------------------------------------------------
- */
+/* ---- settings ---- */
 
 static double given(double setting, double otherwise)
 {

@@ -49,7 +49,7 @@ const char *tactus_fit_model_at(size_t i, const char **summary)
 	return kinds[i].name;
 }
 
-/* ---- the plan -------------------------------------------------------------------------------------------- */
+/* ---- the plan ---- */
 
 static int find_kind(const char *name, const kind **found)
 {
@@ -135,7 +135,7 @@ static int make_plan(const tactus_fit_options *options, const tactus_series *ser
 	return status == TACTUS_OK ? add_effects(plan, domain, options->effects) : status;
 }
 
-/* ---- a fit at work --------------------------------------------------------------------------------------- */
+/* ---- a fit at work ---- */
 
 static void work_free(tactus_work *work)
 {
@@ -180,7 +180,7 @@ static int work_new(tactus_work *work, const tactus_plan *plan, int folds)
 	return TACTUS_OK;
 }
 
-/* ---- the result ------------------------------------------------------------------------------------------ */
+/* ---- the result ---- */
 
 static void score_outputs(const tactus_plan *plan, const tactus_points *points, const tactus_outcome *outcome,
 						  tactus_fit_channel *channel)

@@ -22,7 +22,7 @@ using Eigen::Index;
 
 const size_t probe_samples = 4096; /* what decides on the structure of a longer recording */
 
-/* ---- the solution ---------------------------------------------------------------------------------------- */
+/* ---- the solution ---- */
 
 class Solver
 {
@@ -35,41 +35,51 @@ class Solver
 
 	int minimise();
 	bool confirmed();
-	/* The best linear parameters for the nonlinear ones in values, put there; columns per delta, and what remains. */
+	/* The best linear parameters for the nonlinear ones in values, put there; now holds what follows from them. */
 	bool eliminate(VectorXd &values);
-	/* Outputs' derivatives to the nonlinear parameters, after eliminate(values). */
-	bool derivatives(const VectorXd &values, MatrixXd &d);
+	/* now.d, after eliminate(values). */
+	bool derivatives(const VectorXd &values);
+
+	/* What was computed for these nonlinear parameters (alpha): runs of the chain are what a fit costs. */
+	struct State {
+		VectorXd alpha, beta, residual; /* beta: per delta of the structure */
+		MatrixXd phi, d;                /* columns of the linear parameters per delta, derivatives of the others */
+		bool known = false, with_d = false;
+	};
 
 	ForwardProblem &problem;
 	const Structure &structure;
-	VectorXd best, residual;
-	MatrixXd phi;
+	VectorXd best;
+	State now;
 
   private:
 	bool columns(const VectorXd &values);
 
-	VectorXd rest, y, last; /* last: the nonlinear values that phi and residual belong to */
-	VectorXd last_beta;
+	State accepted; /* the last one with derivatives */
+	VectorXd rest, y;
 };
 
+/* Those that never change are run once, with the effects neutral: a chain skips them then. */
 bool Solver::columns(const VectorXd &values)
 {
-	const bool first = phi.cols() != Index(structure.linear.size()) || rest.size() == 0;
-	VectorXd point = values;
+	const bool first = rest.size() == 0;
+	VectorXd point = values, plain = structure.neutral;
 	for (size_t l : structure.linear)
-		point[Index(l)] = 0;
-	if ((first || !structure.constant.back()) && !problem.simulate(point, rest))
+		point[Index(l)] = plain[Index(l)] = 0;
+	if ((first || !structure.constant.back()) && !problem.simulate(structure.constant.back() ? plain : point, rest))
 		return false;
-	phi.resize(problem.measured.size(), Index(structure.linear.size()));
+	now.phi.resize(problem.measured.size(), Index(structure.linear.size()));
 	for (size_t c = 0; c < structure.linear.size(); c++) {
 		if (!first && structure.constant[c])
 			continue;
-		const auto at = Index(structure.linear[c]);
-		point[at] = structure.delta[structure.linear[c]];
-		if (!problem.simulate(point, y))
+		const size_t j = structure.linear[c];
+		VectorXd one = structure.constant[c] ? plain : point;
+		one[Index(j)] = structure.delta[j];
+		if (!problem.simulate(one, y)) {
+			rest.resize(0);
 			return false;
-		phi.col(Index(c)) = y - rest;
-		point[at] = 0;
+		}
+		now.phi.col(Index(c)) = y - rest;
 	}
 	return true;
 }
@@ -77,34 +87,38 @@ bool Solver::columns(const VectorXd &values)
 bool Solver::eliminate(VectorXd &values)
 {
 	const auto l = Index(structure.linear.size());
-	VectorXd now(Index(structure.nonlinear.size()));
+	VectorXd alpha(Index(structure.nonlinear.size()));
 	for (size_t k = 0; k < structure.nonlinear.size(); k++)
-		now[Index(k)] = values[Index(structure.nonlinear[k])];
-	if (last.size() != now.size() || last_beta.size() != l || last != now) {
-		last.resize(0);
-		if (!columns(values)) {
-			phi.resize(0, 0);
+		alpha[Index(k)] = values[Index(structure.nonlinear[k])];
+	if (accepted.known && accepted.alpha == alpha && !(now.known && now.alpha == alpha))
+		now = accepted;
+	if (!now.known || now.alpha != alpha) {
+		now.known = now.with_d = false;
+		if (!columns(values))
 			return false;
-		}
-		residual = problem.measured - rest;
-		const MatrixXd r = triangle({phi, residual});
+		now.residual = problem.measured - rest;
+		const MatrixXd r = triangle({now.phi, now.residual});
 		const VectorXd diagonal = r.diagonal().head(l).cwiseAbs();
 		if (l && !(diagonal.minCoeff() > 1e-12 * diagonal.maxCoeff()))
 			return false;
-		last_beta = r.topLeftCorner(l, l).triangularView<Eigen::Upper>().solve(r.col(l).head(l));
-		residual.noalias() -= phi * last_beta;
-		last = now;
+		now.beta = r.topLeftCorner(l, l).triangularView<Eigen::Upper>().solve(r.col(l).head(l));
+		now.residual.noalias() -= now.phi * now.beta;
+		now.alpha = alpha;
+		now.known = now.beta.allFinite() && now.residual.allFinite();
 	}
 	for (Index c = 0; c < l; c++)
-		values[Index(structure.linear[size_t(c)])] = last_beta[c] * structure.delta[structure.linear[size_t(c)]];
-	return last_beta.allFinite() && residual.allFinite();
+		values[Index(structure.linear[size_t(c)])] = now.beta[c] * structure.delta[structure.linear[size_t(c)]];
+	return now.known;
 }
 
 /* A small step each, a larger one where that moves nothing. */
-bool Solver::derivatives(const VectorXd &values, MatrixXd &d)
+bool Solver::derivatives(const VectorXd &values)
 {
-	d.resize(problem.measured.size(), Index(structure.nonlinear.size()));
-	const VectorXd y0 = problem.measured - residual;
+	if (now.with_d)
+		return true;
+	now.d.resize(problem.measured.size(), Index(structure.nonlinear.size()));
+	const VectorXd y0 = problem.measured - now.residual;
+	const double rounding = 1e-12 * y0.norm();
 	for (size_t k = 0; k < structure.nonlinear.size(); k++) {
 		const Slot &s = problem.slots[structure.nonlinear[k]];
 		const auto at = Index(structure.nonlinear[k]);
@@ -113,14 +127,17 @@ bool Solver::derivatives(const VectorXd &values, MatrixXd &d)
 			moved[at] = step_inside(s, values[at], s.scale * step);
 			if (!problem.simulate(moved, y))
 				return false;
-			d.col(Index(k)) = (y - y0) / (moved[at] - values[at]);
-			/* What rounding alone may have moved is no movement. */
-			if ((y - y0).norm() > 1e-12 * y0.norm())
+			y -= y0;
+			const bool moves = y.norm() > rounding;
+			now.d.col(Index(k)) = y * (moves ? 1 / (moved[at] - values[at]) : 0);
+			if (moves)
 				break;
-			d.col(Index(k)).setZero();
 		}
 	}
-	return d.allFinite();
+	now.with_d = now.d.allFinite();
+	if (now.with_d)
+		accepted = now;
+	return now.with_d;
 }
 
 /* What Ceres minimises: the projected residual of the whole series, compressed to (nonlinear + 1) numbers. */
@@ -143,13 +160,12 @@ class Projected : public ceres::CostFunction
 		Eigen::Map<VectorXd> out(residuals, k + 1);
 		if (!jacobians || !jacobians[0]) {
 			out.setZero();
-			out[k] = solver->residual.norm();
+			out[k] = solver->now.residual.norm();
 			return true;
 		}
-		MatrixXd d;
-		if (!solver->derivatives(values, d))
+		if (!solver->derivatives(values))
 			return false;
-		const MatrixXd r = triangle({solver->phi, d, solver->residual});
+		const MatrixXd r = triangle({solver->now.phi, solver->now.d, solver->now.residual});
 		out = r.block(l, l + k, k + 1, 1);
 		Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> j(jacobians[0], k + 1, k);
 		j = -r.block(l, l, k + 1, k);
@@ -203,11 +219,11 @@ int Solver::minimise()
 bool Solver::confirmed()
 {
 	return eliminate(best) && problem.simulate(best, y) &&
-		   (problem.measured - residual - y).lpNorm<Eigen::Infinity>() <
+		   (problem.measured - now.residual - y).lpNorm<Eigen::Infinity>() <
 			   1e-8 * problem.measured.lpNorm<Eigen::Infinity>();
 }
 
-/* ---- errors ---------------------------------------------------------------------------------------------- */
+/* ---- errors ---- */
 
 /* Lag-one autocorrelation of the residual within outputs, 0 if negative: neighbours say less than they seem to. */
 double autocorrelation(const ForwardProblem &problem, const VectorXd &residual)
@@ -229,14 +245,13 @@ VectorXd standard_errors(Solver &solver)
 	const ForwardProblem &problem = solver.problem;
 	const Structure &structure = solver.structure;
 	VectorXd errors = VectorXd::Constant(Index(problem.slots.size()), NAN);
-	MatrixXd d;
-	if (!solver.eliminate(solver.best) || !solver.derivatives(solver.best, d))
+	if (!solver.eliminate(solver.best) || !solver.derivatives(solver.best))
 		return errors;
 	std::vector<size_t> order = structure.linear;
 	order.insert(order.end(), structure.nonlinear.begin(), structure.nonlinear.end());
 	const Index n = problem.measured.size(), p = Index(order.size());
 	MatrixXd all(n, p);
-	all << solver.phi, d;
+	all << solver.now.phi, solver.now.d;
 	VectorXd size(p); /* of a column, per unit of its parameter */
 	for (Index c = 0; c < p; c++) {
 		const size_t j = order[size_t(c)];
@@ -252,8 +267,8 @@ VectorXd standard_errors(Solver &solver)
 	const Index rank = qr.rank();
 	const MatrixXd inverse =
 		qr.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>().solve(MatrixXd::Identity(rank, rank));
-	const double f = autocorrelation(problem, solver.residual);
-	const double variance = n > p ? solver.residual.squaredNorm() / double(n - p) * (1 + f) / (1 - f) : NAN;
+	const double f = autocorrelation(problem, solver.now.residual);
+	const double variance = n > p ? solver.now.residual.squaredNorm() / double(n - p) * (1 + f) / (1 - f) : NAN;
 	for (Index c = 0; c < rank; c++) {
 		const Index column = qr.colsPermutation().indices()[c];
 		errors[Index(order[size_t(column)])] = inverse.row(c).norm() * std::sqrt(variance) / size[column];
@@ -275,8 +290,7 @@ void residual_std(const ForwardProblem &problem, const VectorXd &residual, doubl
 			result[o] = spent < 1 ? problem.output_scale[o] * std::sqrt(square[o] / (count[o] * (1 - spent))) : NAN;
 }
 
-/* ---- putting it together
- * ---------------------------------------------------------------------------------------------- */
+/* ---- putting it together ---- */
 
 /* Linear parameters that left their bounds become nonlinear ones, which Ceres keeps inside; true if there were any. */
 bool demote(Solver &solver, Structure &structure)
@@ -318,7 +332,7 @@ int solve(ForwardProblem &full, ForwardProblem &probe, double *noise)
 			continue;
 		if (solver.confirmed()) {
 			full.store(solver.best, standard_errors(solver));
-			residual_std(full, solver.residual, noise);
+			residual_std(full, solver.now.residual, noise);
 			for (size_t j = 0; j < full.slots.size(); j++)
 				full.slots[j].start = solver.best[Index(j)];
 			return TACTUS_OK;

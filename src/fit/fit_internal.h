@@ -13,7 +13,7 @@ extern "C" {
 
 enum { TACTUS_FOLDS_MAX = 32 };
 
-/* ---- points: what one scan says of one channel ----------------------------------------------------------- */
+/* ---- points: what one scan says of one channel ---- */
 
 /* In `sensor` a point has the conductance of the dc row and the capacitance of the ac row of one (sequence, channel).
  */
@@ -32,7 +32,7 @@ typedef struct {
 int tactus_points_new(const tactus_series *series, const tactus_table *recording, tactus_points *points);
 void tactus_points_free(tactus_points *points);
 
-/* ---- stretches of a load history ------------------------------------------------------------------------- */
+/* ---- stretches of a load history ---- */
 
 /*
  * Turning points of x[n]: index of the first sample, of every extreme that a movement of more than `threshold` back
@@ -42,7 +42,7 @@ size_t tactus_turns(const double *x, size_t n, double threshold, size_t *at);
 /* Starts of the holds: stretches in which x stays within `tolerance` of its mean there. at[] holds n. */
 size_t tactus_holds(const double *x, size_t n, double tolerance, size_t *at);
 
-/* ---- cross-validation ------------------------------------------------------------------------------------ */
+/* ---- cross-validation ---- */
 
 typedef struct {
 	int count;             /* folds; 0 when there are too few stretches */
@@ -55,7 +55,7 @@ typedef struct {
 int tactus_folds_new(const double *input, size_t n, int count, tactus_folds *folds);
 void tactus_folds_free(tactus_folds *folds);
 
-/* ---- forward models -------------------------------------------------------------------------------------- */
+/* ---- forward models ---- */
 
 /*
  * Fits the model of one channel to a series. weight[o] (n values, 0 leaves a sample out) says which outputs; NULL:
@@ -68,7 +68,7 @@ int tactus_forward_fit(const tactus_series *series, const tactus_effect *const *
 size_t tactus_forward_parameters(const tactus_domain *domain, const tactus_effect *const *effects, size_t effect_count,
 								 const bool outputs[TACTUS_OUTPUTS_MAX]);
 
-/* ---- estimators ------------------------------------------------------------------------------------------ */
+/* ---- estimators ---- */
 
 /* F = f0 + fg·G + fc·C by Householder QR on scaled columns; parameters[3], std[3], residual standard deviation. */
 int tactus_regress_force(size_t n, const double *conductance_S, const double *capacitance_F, const double *force_N,
@@ -79,7 +79,7 @@ void tactus_network_starts(uint64_t seed, uint64_t stream, size_t starts, double
 double tactus_network_residual(const double *weights, double u, double v, double target, double *gradient);
 void tactus_silence_glog(void);
 
-/* ---- figures --------------------------------------------------------------------------------------------- */
+/* ---- figures ---- */
 
 /* time_s may be NULL or NaN throughout. */
 void tactus_static_figures_of(size_t n, const double *time_s, const double *force_N, const double *estimate_N,

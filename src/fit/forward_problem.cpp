@@ -56,13 +56,14 @@ int ForwardProblem::prepare(bool refit)
 		if (!outputs[o])
 			continue;
 		const double *y = series->signal[output_signal[o]];
+		rows.reserve(rows.size() + samples);
 		double low = INFINITY, high = -INFINITY, mean = 0, square = 0, n = 0;
 		for (size_t i = 0; i < series->n; i += step) {
 			if (!(weight[o][i] > 0) || !std::isfinite(y[i]))
 				continue;
 			rows.push_back({o, i / step, std::sqrt(weight[o][i]), 0});
-			low = std::fmin(low, y[i]);
-			high = std::fmax(high, y[i]);
+			low = std::min(low, y[i]);
+			high = std::max(high, y[i]);
 			const double from = y[i] - mean;
 			mean += from / ++n;
 			square += from * (y[i] - mean);

@@ -135,22 +135,36 @@ class Explorer
 		return std::abs(r(r.rows() - 1, r.cols() - 1)) > 1e-9 * r.col(r.cols() - 1).norm();
 	}
 
-	/* Columns (and the rest) that are the same bits at two unlike points of the nonlinear parameters. */
+	/* Columns (and the rest) that are the same bits at unlike points of the nonlinear parameters, one of them neutral.
+	 */
 	void find_constant()
 	{
 		structure.constant.assign(structure.linear.size() + 1, 0);
-		VectorXd first = start, second = other, a, b;
-		for (size_t l : structure.linear)
-			first[Index(l)] = second[Index(l)] = 0;
-		if (!structure.may_keep || !problem.simulate(first, a) || !problem.simulate(second, b))
+		structure.neutral = start;
+		for (size_t j = 0; j < problem.slots.size(); j++)
+			if (problem.slots[j].effect >= 0)
+				structure.neutral[Index(j)] = problem.slots[j].info->neutral;
+		if (!structure.may_keep)
 			return;
-		structure.constant.back() = a == b;
+		VectorXd points[] = {start, other, structure.neutral};
+		for (VectorXd &point : points)
+			for (size_t l : structure.linear)
+				point[Index(l)] = 0;
+		structure.constant.back() = same(points);
 		for (size_t c = 0; c < structure.linear.size() && structure.constant.back(); c++) {
-			const auto at = Index(structure.linear[c]);
-			first[at] = second[at] = structure.delta[structure.linear[c]];
-			structure.constant[c] = problem.simulate(first, a) && problem.simulate(second, b) && a == b;
-			first[at] = second[at] = 0;
+			for (VectorXd &point : points)
+				point[Index(structure.linear[c])] = structure.delta[structure.linear[c]];
+			structure.constant[c] = same(points);
+			for (VectorXd &point : points)
+				point[Index(structure.linear[c])] = 0;
 		}
+	}
+
+	bool same(const VectorXd (&points)[3])
+	{
+		VectorXd a, b, c;
+		return problem.simulate(points[0], a) && problem.simulate(points[1], b) && problem.simulate(points[2], c) &&
+			   a == b && a == c;
 	}
 
 	ForwardProblem &problem;

@@ -15,6 +15,7 @@ struct Structure {
 	std::vector<char> constant;     /* of each linear parameter's column, then of the rest: never changes */
 	std::vector<double> delta;      /* step of each slot that moves the outputs by about their spread */
 	std::vector<char> never_linear; /* per slot */
+	VectorXd neutral;               /* values with every effect neutral */
 	bool may_keep = true;           /* constant columns may be kept */
 };
 

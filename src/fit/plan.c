@@ -160,7 +160,7 @@ static void fit_one(void *context, size_t i)
 	r->status[i] = status;
 }
 
-/* ---- scoring: exactly what `tactus force` would say ------------------------------------------------------ */
+/* ---- scoring: exactly what `tactus force` would say ---- */
 
 /* Which sample of which channel a row of the recording is, and the point it belongs to. */
 typedef struct {
@@ -297,7 +297,7 @@ static int score(run *r, size_t slots)
 	return status;
 }
 
-/* ---- set-up ---------------------------------------------------------------------------------------------- */
+/* ---- set-up ---- */
 
 static double *missing(size_t n)
 {

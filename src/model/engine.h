@@ -22,8 +22,7 @@ enum {
 	TACTUS_OUTPUTS_MAX = 4
 };
 
-/* ---- parameters ----------------------------------------------------------------------------------------------------
- */
+/* ---- parameters ---- */
 
 enum tactus_parameter_kind {
 	TACTUS_STRENGTH, /* at its neutral value (all strengths of an effect together) the effect changes nothing */
@@ -48,8 +47,7 @@ typedef struct {
 	int output; /* the output it acts on alone, or -1 for all: not fitted when that output is not there */
 } tactus_parameter;
 
-/* ---- signals
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- signals ---- */
 
 enum tactus_role {
 	TACTUS_ROLE_TIME,      /* seconds; NaN throughout when the recording has no clock */
@@ -69,8 +67,7 @@ typedef struct {
 	double fill;
 } tactus_signal;
 
-/* ---- effects
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- effects ---- */
 
 enum tactus_effect_flags {
 	TACTUS_EFFECT_NEIGHBOURS = 1, /* couples channels: the inverse solves them jointly */
@@ -107,8 +104,7 @@ struct tactus_effect {
 /* True if every strength is at its neutral value: the chain then skips the effect. */
 bool tactus_effect_neutral(const tactus_effect *effect, const double *parameters);
 
-/* ---- domains
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- domains ---- */
 
 typedef struct {
 	const char *name;
@@ -181,8 +177,7 @@ enum tactus_readout_stage {
 };
 enum tactus_readout_base { READOUT_BASE_RG };
 
-/* ---- chains: the model of one channel, running
- * -------------------------------------------------------------------------- */
+/* ---- chains: the model of one channel, running ---- */
 
 typedef struct tactus_chain tactus_chain;
 

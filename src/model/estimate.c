@@ -13,8 +13,7 @@ enum { SWEEPS_MAX = 100 };
 static const double converged = 1e-12; /* change of a force between sweeps, of the calibrated range */
 static const double same_load = 4; /* dc and ac of a scan that differ by more standard uncertainties are not one load */
 
-/* ---- setting up ---------------------------------------------------------------------------------------------------
- */
+/* ---- setting up ---- */
 
 static enum tactus_row_mode mode_of(const char *mode)
 {
@@ -128,8 +127,7 @@ void tactus_estimator_reset(tactus_estimator *estimator)
 	}
 }
 
-/* ---- one row ------------------------------------------------------------------------------------------------------
- */
+/* ---- one row ---- */
 
 static tactus_estimator_channel *find_channel(tactus_estimator *estimator, int number)
 {
@@ -284,8 +282,7 @@ tactus_force tactus_estimator_row_force(tactus_estimator *estimator, const tactu
 	return force;
 }
 
-/* ---- a scan -------------------------------------------------------------------------------------------------------
- */
+/* ---- a scan ---- */
 
 /* One Gauss–Seidel sweep over the rows; returns the largest change, in calibrated ranges. */
 static double sweep(tactus_estimator *estimator, const tactus_estimator_row *rows, size_t n, tactus_force *forces)
@@ -330,8 +327,7 @@ void tactus_estimator_scan(tactus_estimator *estimator, const tactus_estimator_r
 		forces[i].quality |= TACTUS_QUALITY_ILL_CONDITIONED;
 }
 
-/* ---- one sample ---------------------------------------------------------------------------------------------------
- */
+/* ---- one sample ---- */
 
 int tactus_estimator_sample(tactus_estimator *estimator, const tactus_sample *sample, tactus_force *force)
 {

@@ -9,8 +9,7 @@
 #include "core/core.h"
 #include "model/estimate.h"
 
-/* ---- what the block must have -------------------------------------------------------------------------------------
- */
+/* ---- what the block must have ---- */
 
 /* A forward model inverts whichever of its readings is there; an estimator needs all. */
 static int check_readings(const tactus_estimator *estimator)
@@ -71,8 +70,7 @@ static int keep_quality(tactus_estimator *estimator, const tactus_table *block)
 	return TACTUS_OK;
 }
 
-/* ---- rows ---------------------------------------------------------------------------------------------------------
- */
+/* ---- rows ---- */
 
 static int read_row(const tactus_estimator *estimator, size_t r, tactus_estimator_row *row)
 {
@@ -129,8 +127,7 @@ static void write_row(const tactus_estimator *estimator, const result_columns *t
 	to->quality[r] = unchanged ? estimator->text[r] : tactus_quality_name(force->quality);
 }
 
-/* ---- scans --------------------------------------------------------------------------------------------------------
- */
+/* ---- scans ---- */
 
 /* The end of the scan that begins at a row: rows of one sequence, one after the other. */
 static size_t scan_end(const tactus_columns *columns, size_t first)

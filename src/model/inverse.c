@@ -57,8 +57,7 @@ struct tactus_inverse {
 	double *signal[TACTUS_SIGNALS_MAX];
 };
 
-/* ---- setting up ---------------------------------------------------------------------------------------------------
- */
+/* ---- setting up ---- */
 
 /* A chain of the model's active effects that move no time, with or without those that remember. */
 static int make_chain(const tactus_model *model, const tactus_model_channel_data *data, bool memory,
@@ -167,8 +166,7 @@ void tactus_inverse_restore(tactus_inverse *inverse)
 	copy_state(inverse, inverse->state, inverse->saved);
 }
 
-/* ---- forward ------------------------------------------------------------------------------------------------------
- */
+/* ---- forward ---- */
 
 static double run(tactus_inverse *inverse, tactus_chain *chain, const reading_model *output, double force)
 {
@@ -212,8 +210,7 @@ static bool prepare(tactus_inverse *inverse)
 	return true;
 }
 
-/* ---- the root -----------------------------------------------------------------------------------------------------
- */
+/* ---- the root ---- */
 
 typedef struct {
 	tactus_inverse *inverse;
@@ -267,8 +264,7 @@ static double find(tactus_inverse *inverse, const reading_model *output, double 
 	return fabs(at_b) < fabs(at_a) ? walk(&e, b, at_b, fabs(b - a)) : walk(&e, a, at_a, 0);
 }
 
-/* ---- one output ---------------------------------------------------------------------------------------------------
- */
+/* ---- one output ---- */
 
 /* The larger of the calibration's residual and the reading's own uncertainty; NaN if neither is known. */
 static double sigma_of(const reading_model *output, double reading_std)
@@ -359,8 +355,7 @@ static tactus_inverse_result solve_output(tactus_inverse *inverse, reading_model
 	return result;
 }
 
-/* ---- all outputs --------------------------------------------------------------------------------------------------
- */
+/* ---- all outputs ---- */
 
 /* Flags are those of the one that weighs more. Without both uncertainties there is no weight: then the known one. */
 tactus_inverse_result tactus_inverse_combine(tactus_inverse_result a, tactus_inverse_result b)

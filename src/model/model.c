@@ -209,7 +209,7 @@ int tactus_model_chain(const tactus_model *model, const tactus_model_channel_dat
 	return tactus_chain_new(model->domain, channel->base, model->effects, parameters, model->effect_count, chain);
 }
 
-/* ---- getters ---------------------------------------------------------------------------------------------------- */
+/* ---- getters ---- */
 
 enum tactus_form tactus_model_form(const tactus_model *model)
 {
@@ -246,8 +246,7 @@ tactus_metadata *tactus_model_provenance(const tactus_model *model)
 	return model->provenance;
 }
 
-/* ---- parameters: base, then effects, then the estimator's, as one list ---------------------------------------------
- */
+/* ---- parameters: base, then effects, then the estimator's, as one list ---- */
 
 const char *tactus_model_unit(const tactus_model *model, const char *unit)
 {
@@ -353,8 +352,7 @@ int tactus_model_set(tactus_model *model, size_t channel_index, const char *effe
 					   effect && *effect ? " in effect " : "", effect ? effect : "");
 }
 
-/* ---- fingerprint (FNV-1a over what changes a result)
- * ------------------------------------------------------------------ */
+/* ---- fingerprint (FNV-1a over what changes a result) ---- */
 
 static void hash_bytes(uint64_t *hash, const void *bytes, size_t n)
 {

@@ -89,8 +89,7 @@ static int make_groups(const tactus_columns *columns, groups *g)
 	return TACTUS_OK;
 }
 
-/* ---- gathering ----------------------------------------------------------------------------------------------------
- */
+/* ---- gathering ---- */
 
 /* The values of a column in the series' rows; rows of other modes are left out (NaN) unless mode is "". */
 static double *gather(const tactus_columns *columns, const double *column, const group *g, const char *mode)
@@ -189,8 +188,7 @@ static int fill_series(const tactus_columns *columns, const group *g, bool input
 	return TACTUS_OK;
 }
 
-/* ---- neighbours ---------------------------------------------------------------------------------------------------
- */
+/* ---- neighbours ---- */
 
 typedef struct {
 	double key, value;
@@ -276,8 +274,7 @@ static int add_neighbours(const tactus_columns *columns, tactus_series *series, 
 	return TACTUS_OK;
 }
 
-/* ---- splitting ----------------------------------------------------------------------------------------------------
- */
+/* ---- splitting ---- */
 
 void tactus_series_free(tactus_series *series, size_t count)
 {

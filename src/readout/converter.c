@@ -41,8 +41,7 @@ tactus_convert_options tactus_convert_defaults(void)
 	return (tactus_convert_options){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
 }
 
-/* ---- settings ------------------------------------------------------------------------------------------------------
- */
+/* ---- settings ---- */
 
 enum range { POSITIVE, NOT_NEGATIVE, NOT_ZERO };
 
@@ -213,8 +212,7 @@ void tactus_converter_free(tactus_converter *converter)
 	free(converter);
 }
 
-/* ---- columns -------------------------------------------------------------------------------------------------------
- */
+/* ---- columns ---- */
 
 static const char *const outputs[] = {"resistance_ohm",     "conductance_S",     "capacitance_F",
 									  "resistance_std_ohm", "conductance_std_S", "capacitance_std_F"};
@@ -354,8 +352,7 @@ static int take_columns(const struct tactus_converter *c, tactus_table *block, s
 	return error;
 }
 
-/* ---- rows ----------------------------------------------------------------------------------------------------------
- */
+/* ---- rows ---- */
 
 /* The column's value, or where it has none the setting. */
 static const double *filled(const double *column, double otherwise, size_t n, double *room)

@@ -100,8 +100,7 @@ void tactus_demodulator_free(tactus_demodulator *demodulator)
 	free(demodulator);
 }
 
-/* ---- slots ---------------------------------------------------------------------------------------------------------
- */
+/* ---- slots ---- */
 
 /* The slot that begins at the next sample; given: its channel, NaN where the schedule says. */
 static void begin_slot(struct tactus_demodulator *d, double given)
@@ -256,8 +255,7 @@ static int add_samples(struct tactus_demodulator *d, size_t n, const double *sam
 	return error;
 }
 
-/* ---- readings as a table -------------------------------------------------------------------------------------------
- */
+/* ---- readings as a table ---- */
 
 static int describe(const struct tactus_demodulator *d, tactus_metadata *metadata)
 {

@@ -4,7 +4,7 @@
 #include "core/core.h"
 #include "fit/fit_work.h"
 
-/* ---- folds ----------------------------------------------------------------------------------------------- */
+/* ---- folds ---- */
 
 /* Fills force with a staircase of `levels` steps of five samples each; returns the number of samples. */
 static size_t staircase(double *force, size_t levels)
@@ -151,7 +151,7 @@ static void a_network_that_learns_its_steps_is_found_out(void **state)
 	tactus_table_free(table);
 }
 
-/* ---- figures --------------------------------------------------------------------------------------------- */
+/* ---- figures ---- */
 
 enum { SWEEP = 2001 };
 
@@ -259,7 +259,7 @@ static void drift_is_the_change_over_the_longest_hold(void **state)
 	assert_null(f.drift_missing);
 }
 
-/* ---- refusals -------------------------------------------------------------------------------------------- */
+/* ---- refusals ---- */
 
 static tactus_table *plain(size_t n)
 {

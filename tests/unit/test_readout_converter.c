@@ -62,8 +62,7 @@ static void detectors_are_written_and_read(void **state)
 	tactus_metadata_free(metadata);
 }
 
-/* ---- tables --------------------------------------------------------------------------------------------------------
- */
+/* ---- tables ---- */
 
 static void numbers(tactus_table *table, const char *name, size_t n, const double *values)
 {

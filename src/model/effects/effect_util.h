@@ -57,7 +57,7 @@ static inline void tactus_divide(double *re, double *im, double z_re, double z_i
 	*re = quotient;
 }
 
-/* ---- testable ------------------------------------------------------------------------------------------------ */
+/* ---- testable ---- */
 
 static inline const char *tactus_want_clock(const tactus_series *series)
 {
