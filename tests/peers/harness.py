@@ -64,7 +64,7 @@ class Table:
                  None if at_least is None else ratio >= at_least)
 
     def missed(self):
-        return [row[0] for section in self.sections for row in section[2] if row[5] == "**missed**"]
+        return [row[0].split(":")[0] for section in self.sections for row in section[2] if row[5] == "**missed**"]
 
     def write(self, path, versions):
         lines = ["# Benchmarks", "", "Made by `make bench`. Times are of this machine and this hour; what is judged is the "
