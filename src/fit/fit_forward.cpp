@@ -20,7 +20,7 @@ namespace
 using namespace tactus;
 using Eigen::Index;
 
-const size_t probe_samples = 4096; /* what decides on the structure of a longer recording */
+const size_t probe_samples = 2048; /* what decides on the structure of a longer recording */
 
 /* ---- the solution ---- */
 
@@ -97,12 +97,19 @@ bool Solver::eliminate(VectorXd &values)
 		if (!columns(values))
 			return false;
 		now.residual = problem.measured - rest;
-		const MatrixXd r = triangle({now.phi, now.residual});
-		const VectorXd diagonal = r.diagonal().head(l).cwiseAbs();
+		const MatrixXd r = triangle({now.phi});
+		const VectorXd diagonal = r.diagonal().cwiseAbs();
 		if (l && !(diagonal.minCoeff() > 1e-12 * diagonal.maxCoeff()))
 			return false;
-		now.beta = r.topLeftCorner(l, l).triangularView<Eigen::Upper>().solve(r.col(l).head(l));
-		now.residual.noalias() -= now.phi * now.beta;
+		/* Seminormal equations, corrected once (Björck 1987): as good as with Q. */
+		now.beta.setZero(l);
+		for (int pass = 0; pass < 2 && l; pass++) {
+			VectorXd step = now.phi.transpose() * now.residual;
+			r.triangularView<Eigen::Upper>().transpose().solveInPlace(step);
+			r.triangularView<Eigen::Upper>().solveInPlace(step);
+			now.beta += step;
+			now.residual.noalias() -= now.phi * step;
+		}
 		now.alpha = alpha;
 		now.known = now.beta.allFinite() && now.residual.allFinite();
 	}
@@ -135,7 +142,7 @@ bool Solver::derivatives(const VectorXd &values)
 		}
 	}
 	now.with_d = now.d.allFinite();
-	if (now.with_d)
+	if (now.with_d && !structure.nonlinear.empty())
 		accepted = now;
 	return now.with_d;
 }
@@ -169,11 +176,36 @@ class Projected : public ceres::CostFunction
 		out = r.block(l, l + k, k + 1, 1);
 		Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> j(jacobians[0], k + 1, k);
 		j = -r.block(l, l, k + 1, k);
+		const double spread =
+			std::abs(out[k]) / std::sqrt(double(std::max<Index>(solver->now.residual.size() - k - l, 1)));
+		offset = out.head(k).norm() / (std::sqrt(double(k)) * spread);
 		return out.allFinite() && j.allFinite();
 	}
+	/*
+	 * Relative offset (Bates & Watts 1981) where the Jacobian was taken last: how far the parameters still are from the
+	 * optimum, in standard errors.
+	 */
+	mutable double offset = INFINITY;
 
   private:
 	Solver *solver;
+};
+
+/* Ends the minimisation when what is left to gain is far below what the data can tell. */
+class Converged : public ceres::IterationCallback
+{
+  public:
+	explicit Converged(const Projected *p) : projected(p)
+	{
+	}
+	ceres::CallbackReturnType operator()(const ceres::IterationSummary &summary) override
+	{
+		return summary.step_is_successful && projected->offset < 1e-3 ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+																	  : ceres::SOLVER_CONTINUE;
+	}
+
+  private:
+	const Projected *projected;
 };
 
 int Solver::minimise()
@@ -188,7 +220,8 @@ int Solver::minimise()
 	for (size_t j : structure.nonlinear)
 		alpha.push_back(best[Index(j)]);
 	ceres::Problem ceres_problem;
-	ceres_problem.AddResidualBlock(new Projected(this), nullptr, alpha.data());
+	Projected *projected = new Projected(this); /* the problem's own from here */
+	ceres_problem.AddResidualBlock(projected, nullptr, alpha.data());
 	for (size_t k = 0; k < structure.nonlinear.size(); k++) {
 		const Slot &s = problem.slots[structure.nonlinear[k]];
 		if (std::isfinite(s.lower))
@@ -203,6 +236,8 @@ int Solver::minimise()
 	options.function_tolerance = 1e-10;
 	options.gradient_tolerance = 1e-14;
 	options.parameter_tolerance = 1e-9;
+	Converged converged(projected);
+	options.callbacks.push_back(&converged);
 	ceres::Solver::Summary summary;
 	ceres::Solve(options, &ceres_problem, &summary);
 	if (summary.termination_type == ceres::NO_CONVERGENCE)
@@ -229,9 +264,13 @@ bool Solver::confirmed()
 double autocorrelation(const ForwardProblem &problem, const VectorXd &residual)
 {
 	double product = 0;
-	for (size_t r = 0; r + 1 < problem.rows.size(); r++)
-		if (problem.rows[r + 1].output == problem.rows[r].output)
-			product += residual[Index(r)] * residual[Index(r + 1)];
+	Index at = 0;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const Index n = Index(problem.rows[o].size());
+		if (n > 1)
+			product += residual.segment(at, n - 1).dot(residual.segment(at + 1, n - 1));
+		at += n;
+	}
 	const double square = residual.squaredNorm();
 	return square > 0 ? std::fmin(std::fmax(product / square, 0.0), 0.99) : 0;
 }
@@ -250,20 +289,19 @@ VectorXd standard_errors(Solver &solver)
 	std::vector<size_t> order = structure.linear;
 	order.insert(order.end(), structure.nonlinear.begin(), structure.nonlinear.end());
 	const Index n = problem.measured.size(), p = Index(order.size());
-	MatrixXd all(n, p);
-	all << solver.now.phi, solver.now.d;
+	MatrixXd r = triangle({solver.now.phi, solver.now.d});
 	VectorXd size(p); /* of a column, per unit of its parameter */
 	for (Index c = 0; c < p; c++) {
 		const size_t j = order[size_t(c)];
 		const bool bound =
 			solver.best[Index(j)] <= problem.slots[j].lower || solver.best[Index(j)] >= problem.slots[j].upper;
-		const double norm = bound ? 0 : all.col(c).norm();
-		all.col(c) *= norm > 0 ? 1 / norm : 0;
+		const double norm = bound ? 0 : r.col(c).norm();
+		r.col(c) *= norm > 0 ? 1 / norm : 0;
 		size[c] = c < Index(structure.linear.size()) ? norm / structure.delta[j] : norm;
 	}
 	Eigen::ColPivHouseholderQR<MatrixXd> qr;
 	qr.setThreshold(1e-9);
-	qr.compute(triangle({all}));
+	qr.compute(r);
 	const Index rank = qr.rank();
 	const MatrixXd inverse =
 		qr.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>().solve(MatrixXd::Identity(rank, rank));
@@ -279,15 +317,15 @@ VectorXd standard_errors(Solver &solver)
 /* Standard deviation of each output about the model; the parameters are shared out by the number of readings. */
 void residual_std(const ForwardProblem &problem, const VectorXd &residual, double *result)
 {
-	double square[TACTUS_OUTPUTS_MAX] = {}, count[TACTUS_OUTPUTS_MAX] = {};
-	for (size_t r = 0; r < problem.rows.size(); r++) {
-		square[problem.rows[r].output] += residual[Index(r)] * residual[Index(r)];
-		count[problem.rows[r].output]++;
+	const double spent = double(problem.slots.size()) / double(residual.size());
+	Index at = 0;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const Index n = Index(problem.rows[o].size());
+		if (n)
+			result[o] = problem.output_scale[o] * residual.segment(at, n).norm() /
+						std::sqrt(double(n) * std::fmax(1 - spent, 0));
+		at += n;
 	}
-	const double spent = double(problem.slots.size()) / double(problem.rows.size());
-	for (size_t o = 0; o < problem.output_count; o++)
-		if (problem.outputs[o])
-			result[o] = spent < 1 ? problem.output_scale[o] * std::sqrt(square[o] / (count[o] * (1 - spent))) : NAN;
 }
 
 /* ---- putting it together ---- */
@@ -360,12 +398,12 @@ int fit(const tactus_series *series, const tactus_effect *const *effects, size_t
 	int status = full.prepare(refit);
 	if (status != TACTUS_OK)
 		return status;
-	if (full.rows.size() <= full.slots.size())
-		return tactus_fail(TACTUS_ERR_DATA, "%zu readings are too few for %zu parameters", full.rows.size(),
+	if (full.measured.size() <= Index(full.slots.size()))
+		return tactus_fail(TACTUS_ERR_DATA, "%zu readings are too few for %zu parameters", size_t(full.measured.size()),
 						   full.slots.size());
 	ForwardProblem thin(series, effects, effect_count, weight, data, odd_stride(series->n / probe_samples + 1));
-	const bool use_thin =
-		series->n > 4 * probe_samples && thin.prepare(refit) == TACTUS_OK && thin.rows.size() > 4 * thin.slots.size();
+	const bool use_thin = series->n > 8 * probe_samples && thin.prepare(refit) == TACTUS_OK &&
+						  thin.measured.size() > 4 * Index(thin.slots.size());
 	ForwardProblem &probe = use_thin ? thin : full;
 	status = solve(full, probe, data->residual_std);
 	bool several = false;
@@ -374,9 +412,12 @@ int fit(const tactus_series *series, const tactus_effect *const *effects, size_t
 	if (status != TACTUS_OK || !several || effect_count == 0)
 		return status;
 	/* Each output by its own noise, once: what one output says well must not drown in the other's. */
+	double noise[TACTUS_OUTPUTS_MAX];
 	for (size_t o = 0; o < full.output_count; o++)
-		if (full.outputs[o] && data->residual_std[o] > 1e-9 * full.output_scale[o])
-			full.set_scale(o, data->residual_std[o]);
+		noise[o] = data->residual_std[o] > 1e-9 * full.output_scale[o] ? data->residual_std[o] : full.output_scale[o];
+	full.set_scales(noise);
+	if (use_thin)
+		thin.set_scales(noise);
 	probe.slots = full.slots;
 	return solve(full, probe, data->residual_std);
 }

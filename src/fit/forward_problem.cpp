@@ -10,6 +10,8 @@
 namespace tactus
 {
 
+using Eigen::Index;
+
 bool fitted(const tactus_parameter &parameter, const bool *outputs)
 {
 	return parameter.kind != TACTUS_CONSTANT && (parameter.output < 0 || outputs[parameter.output]);
@@ -52,30 +54,32 @@ void ForwardProblem::thin(size_t stride)
 
 int ForwardProblem::prepare(bool refit)
 {
+	size_t total = 0;
 	for (size_t o = 0; o < output_count; o++) {
 		if (!outputs[o])
 			continue;
 		const double *y = series->signal[output_signal[o]];
-		rows.reserve(rows.size() + samples);
-		double low = INFINITY, high = -INFINITY, mean = 0, square = 0, n = 0;
+		double low = INFINITY, high = -INFINITY, sum = 0, square = 0;
+		rows[o].reserve(samples);
 		for (size_t i = 0; i < series->n; i += step) {
 			if (!(weight[o][i] > 0) || !std::isfinite(y[i]))
 				continue;
-			rows.push_back({o, i / step, std::sqrt(weight[o][i]), 0});
+			rows[o].push_back({i / step, std::sqrt(weight[o][i])});
 			low = std::min(low, y[i]);
 			high = std::max(high, y[i]);
-			const double from = y[i] - mean;
-			mean += from / ++n;
-			square += from * (y[i] - mean);
+			sum += y[i];
 		}
-		if (!(square > 0))
+		const double n = double(rows[o].size());
+		for (const Row &row : rows[o])
+			square += std::pow(y[row.sample * step] - sum / n, 2);
+		if (!(high > low))
 			return tactus_fail(TACTUS_ERR_DATA, "%s never changes", series->output_name[o]);
 		output_range[o] = high - low;
 		output_scale[o] = std::sqrt(square / n);
+		total += rows[o].size();
 	}
-	measured.resize(Eigen::Index(rows.size()));
-	for (size_t o = 0; o < output_count; o++)
-		set_scale(o, output_scale[o]);
+	measured.resize(Index(total));
+	set_scales(output_scale);
 	for (size_t i = 0; i < series->domain->base_count; i++)
 		add_slot(-1, i, series->domain->base[i], data->base[i], refit);
 	for (size_t k = 0; k < effects.size(); k++)
@@ -90,15 +94,13 @@ int ForwardProblem::prepare(bool refit)
 	return status;
 }
 
-void ForwardProblem::set_scale(size_t output, double scale)
+void ForwardProblem::set_scales(const double *scales)
 {
-	output_scale[output] = scale;
-	for (size_t r = 0; r < rows.size(); r++) {
-		if (rows[r].output != output)
-			continue;
-		rows[r].factor = rows[r].weight / scale;
-		measured[Eigen::Index(r)] = series->signal[output_signal[output]][rows[r].sample * step] * rows[r].factor;
-	}
+	std::copy_n(scales, output_count, output_scale);
+	Index at = 0;
+	for (size_t o = 0; o < output_count; o++)
+		for (const Row &row : rows[o])
+			measured[at++] = series->signal[output_signal[o]][row.sample * step] * row.root_weight / output_scale[o];
 }
 
 /* Ranges in a unit such as "output0/N": start and scale of a parameter are stated for a range of 1 (engine.h). */
@@ -142,9 +144,11 @@ bool ForwardProblem::simulate(const VectorXd &values, VectorXd &y)
 	tactus_chain_reset(chain.get());
 	if (tactus_chain_run(chain.get(), samples, signal) != TACTUS_OK)
 		return false;
-	y.resize(Eigen::Index(rows.size()));
-	for (size_t r = 0; r < rows.size(); r++)
-		y[Eigen::Index(r)] = predicted[rows[r].output][rows[r].sample] * rows[r].factor;
+	y.resize(measured.size());
+	Index at = 0;
+	for (size_t o = 0; o < output_count; o++)
+		for (const Row &row : rows[o])
+			y[at++] = predicted[o][row.sample] * row.root_weight / output_scale[o];
 	return y.allFinite();
 }
 

@@ -23,10 +23,10 @@ struct Slot {
 	double start, scale, lower, upper;
 };
 
-/* A reading that trains; factor is √weight / scale of its output. */
+/* A reading that trains. */
 struct Row {
-	size_t output, sample;
-	double weight, factor;
+	size_t sample;
+	double root_weight;
 };
 
 struct ChainFree {
@@ -46,8 +46,8 @@ class ForwardProblem
 				   const double *const *weight, tactus_model_channel_data *data, size_t stride);
 	/* TACTUS_ERR_DATA if a reading never changes; sets constants of the model's form in the channel's data. */
 	int prepare(bool refit);
-	/* Each output counts by this standard deviation from now on. */
-	void set_scale(size_t output, double scale);
+	/* Each output counts by its standard deviation here from now on. */
+	void set_scales(const double *scales);
 	/* The chain with these values, at the rows, weighted. False if anything there is not finite. */
 	bool simulate(const VectorXd &values, VectorXd &y);
 	bool memoryless() const;
@@ -57,8 +57,8 @@ class ForwardProblem
 	size_t output_count = 0;
 	bool outputs[TACTUS_OUTPUTS_MAX] = {};
 	double output_scale[TACTUS_OUTPUTS_MAX] = {};
-	std::vector<Row> rows;
-	VectorXd measured; /* reading × factor */
+	std::vector<Row> rows[TACTUS_OUTPUTS_MAX]; /* of each output; stacked in this order everywhere */
+	VectorXd measured;                         /* reading × √weight / scale of its output */
 	std::vector<Slot> slots;
 
   private:

@@ -9,25 +9,56 @@ namespace tactus
 
 using Eigen::Index;
 
-MatrixXd triangle(std::initializer_list<Columns> parts)
+namespace
 {
-	const Index chunk = 512, rows = parts.begin()->rows();
-	Index n = 0;
-	for (const Columns &part : parts)
-		n += part.cols();
+
+using Column = Eigen::Map<const VectorXd>;
+
+const Index chunk = 512; /* rows at a time: they stay in the cache */
+
+/* Cholesky factor of the Gram matrix; false if the columns are not well apart: that squares their condition. */
+bool gram_triangle(const std::vector<Column> &column, MatrixXd &r)
+{
+	const Index n = Index(column.size()), rows = column.front().size();
+	MatrixXd gram = MatrixXd::Zero(n, n);
+	for (Index at = 0; at < rows; at += chunk) {
+		const Index m = std::min(chunk, rows - at);
+		for (Index i = 0; i < n; i++)
+			for (Index j = i; j < n; j++)
+				gram(i, j) += column[size_t(i)].segment(at, m).dot(column[size_t(j)].segment(at, m));
+	}
+	const Eigen::LLT<MatrixXd, Eigen::Upper> cholesky(gram);
+	r = cholesky.matrixU();
+	return cholesky.info() == Eigen::Success && (r.diagonal().array() > 0.02 * gram.diagonal().array().sqrt()).all();
+}
+
+MatrixXd householder_triangle(const std::vector<Column> &column)
+{
+	const Index n = Index(column.size()), rows = column.front().size();
 	MatrixXd stack = MatrixXd::Zero(n + chunk, n);
 	for (Index at = 0; at < rows; at += chunk) {
 		const Index m = std::min(chunk, rows - at);
-		Index column = 0;
-		for (const Columns &part : parts) {
-			stack.block(n, column, m, part.cols()) = part.middleRows(at, m);
-			column += part.cols();
-		}
+		for (Index c = 0; c < n; c++)
+			stack.col(c).segment(n, m) = column[size_t(c)].segment(at, m);
 		stack.bottomRows(chunk - m).setZero();
 		Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(stack);
 		stack.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
 	}
 	return stack.topRows(n);
+}
+
+} // namespace
+
+MatrixXd triangle(std::initializer_list<Columns> parts)
+{
+	std::vector<Column> column;
+	for (const Columns &part : parts)
+		for (Index c = 0; c < part.cols(); c++)
+			column.emplace_back(part.col(c).data(), part.rows());
+	MatrixXd r;
+	if (column.empty() || gram_triangle(column, r))
+		return r;
+	return householder_triangle(column);
 }
 
 double step_inside(const Slot &s, double value, double h)

@@ -27,7 +27,7 @@ double step_inside(const Slot &s, double value, double h);
 
 using Columns = Eigen::Ref<const MatrixXd>;
 
-/* Upper triangle R of QR = [parts side by side], taken up in chunks that stay in the cache. */
+/* Upper triangle R with R'R = A'A, A = [parts side by side]; signs of its rows are arbitrary. */
 MatrixXd triangle(std::initializer_list<Columns> parts);
 
 } // namespace tactus

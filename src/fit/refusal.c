@@ -14,10 +14,12 @@ tactus_moments tactus_moments_of(const double *x, const bool *use, size_t n)
 		m.n++;
 		m.low = x[i] < m.low ? x[i] : m.low;
 		m.high = x[i] > m.high ? x[i] : m.high;
-		double from = x[i] - m.mean;
-		m.mean += from / (double)m.n;
-		m.square += from * (x[i] - m.mean);
+		m.mean += x[i];
 	}
+	m.mean /= m.n ? (double)m.n : 1;
+	for (size_t i = 0; i < n; i++)
+		if (use[i] && !isnan(x[i]))
+			m.square += (x[i] - m.mean) * (x[i] - m.mean);
 	return m;
 }
 
