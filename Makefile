@@ -40,7 +40,9 @@ COMMON := $(OPT) $(SANITIZE) -fvisibility=hidden -fPIC -pthread -ffp-contract=of
 CFLAGS_ALL := -std=c17 $(WARN) -Wstrict-prototypes -Wmissing-prototypes $(COMMON) $(CFLAGS)
 CXXFLAGS_ALL := -std=c++17 $(WARN) -Wno-missing-declarations $(COMMON) $(CXXFLAGS)
 LIB_CFLAGS := -Isrc $(PKG_CFLAGS)
-LIB_CXXFLAGS := -Isrc $(patsubst -I%,-isystem %,$(PKG_CFLAGS)) -isystem /usr/include/eigen3
+# Debian keeps the headers of Dragonbox in a directory with their version.
+LIB_CXXFLAGS := -Isrc $(patsubst -I%,-isystem %,$(PKG_CFLAGS)) -isystem /usr/include/eigen3 \
+	$(patsubst %,-isystem %,$(lastword $(wildcard /usr/include/dragonbox-*)))
 # What a program that links the static library needs besides.
 LDLIBS_PRIVATE := $(PKG_LIBS) -lceres -lglog -lstdc++ -lm -pthread
 DEPFLAGS = -MMD -MP
@@ -90,7 +92,8 @@ FORCE:
 # Says once what is missing instead of a page of compiler errors.
 $(BUILD)/packages: Makefile
 	@mkdir -p $(@D)
-	@pkg-config --exists $(PACKAGES) eigen3 || { echo 'Libraries are missing: run scripts/setup first.' >&2; exit 1; }
+	@{ pkg-config --exists $(PACKAGES) eigen3 && \
+		echo '#include <dragonbox/dragonbox.h>' | $(CXX) $(LIB_CXXFLAGS) -std=c++17 -E -x c++ - >/dev/null 2>&1; } || { echo 'Libraries are missing: run scripts/setup first.' >&2; exit 1; }
 	@touch $@
 
 $(LIB_OBJ) $(CLI_OBJ): $(BUILD)/flags | $(BUILD)/packages
