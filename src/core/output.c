@@ -78,7 +78,7 @@ static int open_path(struct tactus_output *output, const char *path, unsigned fl
 	if (!output->path)
 		return tactus_fail(TACTUS_ERR_MEMORY, "memory ran out");
 	bool in_place = !regular || (flags & (TACTUS_WRITE_IN_PLACE | TACTUS_WRITE_APPEND));
-	output->truncate = regular && !output->append;
+	output->truncate = in_place && regular && !output->append;
 	return in_place ? open_in_place(output, exists) : open_beside(output, exists ? info.st_mode & 0777 : 0666);
 }
 
@@ -98,16 +98,21 @@ int tactus_output_open(const char *path, unsigned flags, struct tactus_output *o
 
 /* ---- writing ---- */
 
-int tactus_output_write(int fd, const char *bytes, size_t length)
+int tactus_output_write(int fd, struct iovec *pieces, int count)
 {
-	while (length > 0) {
-		ssize_t n = write(fd, bytes, length);
+	while (count > 0) {
+		ssize_t n = writev(fd, pieces, count);
 		if (n < 0 && errno == EAGAIN)
 			poll(&(struct pollfd){.fd = fd, .events = POLLOUT}, 1, -1);
 		else if (n < 0 && errno != EINTR)
 			return errno;
-		bytes += n > 0 ? n : 0;
-		length -= n > 0 ? (size_t)n : 0;
+		size_t written = n > 0 ? (size_t)n : 0;
+		for (; count > 0 && written >= pieces->iov_len; pieces++, count--)
+			written -= pieces->iov_len;
+		if (count > 0) {
+			pieces->iov_base = (char *)pieces->iov_base + written;
+			pieces->iov_len -= written;
+		}
 	}
 	return 0;
 }
@@ -129,7 +134,7 @@ int tactus_output_flush(struct tactus_output *output)
 	int error = empty_old_file(output);
 	if (error)
 		return error;
-	int code = tactus_output_write(output->fd, output->buffer, used);
+	int code = tactus_output_write(output->fd, &(struct iovec){output->buffer, used}, 1);
 	return code ? tactus_output_fail(output, code) : TACTUS_OK;
 }
 

@@ -2,6 +2,8 @@
 #ifndef TACTUS_OUTPUT_H
 #define TACTUS_OUTPUT_H
 
+#include <sys/uio.h>
+
 #include <tactus/table.h>
 
 struct tactus_output {
@@ -22,8 +24,9 @@ int tactus_output_open(const char *path, unsigned flags, struct tactus_output *o
 char *tactus_output_room(struct tactus_output *output, size_t length, int *error);
 /* True if the last byte of an existing file is a line end. */
 bool tactus_output_ends_line(const struct tactus_output *output);
-/* Writes all bytes; 0 or an errno. Needs nothing of an output, so that any thread may call it. */
-int tactus_output_write(int fd, const char *bytes, size_t length);
+/* Writes all bytes; 0 or an errno. Needs nothing of an output, so that any thread may call it. Consumes pieces[count].
+ */
+int tactus_output_write(int fd, struct iovec *pieces, int count);
 /* TACTUS_ERR_OUTPUT or TACTUS_ERR_CLOSED, with the output's name and what the errno means. */
 int tactus_output_fail(const struct tactus_output *output, int code);
 int tactus_output_flush(struct tactus_output *output);

@@ -77,9 +77,10 @@ static size_t slice_count(const struct tactus_row_writer *rows)
 static void write_slices(void *context)
 {
 	struct tactus_row_writer *rows = context;
-	const struct tactus_output *output = &rows->writer->output;
-	for (size_t i = 0; i < slice_count(rows) && !rows->write_errno; i++)
-		rows->write_errno = tactus_output_write(output->fd, rows->slices[i].bytes, rows->slices[i].used);
+	struct iovec pieces[SLICES];
+	for (size_t i = 0; i < slice_count(rows); i++)
+		pieces[i] = (struct iovec){rows->slices[i].bytes, rows->slices[i].used};
+	rows->write_errno = tactus_output_write(rows->writer->output.fd, pieces, (int)slice_count(rows));
 }
 
 /* ---- the caller ---- */
