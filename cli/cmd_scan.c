@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "cli.h"
+#include "tare.h"
 
 enum { READINGS = 4096 };
 
@@ -22,9 +23,7 @@ struct scan {
 	tactus_writer *writer;
 	double after_s; /* --append: added to times and sequence numbers */
 	uint64_t after_scans;
-	int *tare_channels; /* --tare: the mean estimate of each channel's first second */
-	double *tare_N;
-	size_t tare_count;
+	struct cli_tare tare;        /* --tare */
 	uint64_t first, last, scans; /* sequence numbers, and how many scans came */
 	bool progress;
 	double shown_s;
@@ -173,56 +172,6 @@ static int build(struct scan *scan)
 	return error ? error : tactus_estimator_block(scan->estimator, scan->table); /* its columns, for the header */
 }
 
-static double *tare_of(const struct scan *scan, int channel)
-{
-	for (size_t i = 0; i < scan->tare_count; i++)
-		if (scan->tare_channels[i] == channel)
-			return &scan->tare_N[i];
-	return NULL;
-}
-
-/* Means of the first second's estimates, channel by channel; a channel without one is not tared. */
-static int find_tare(struct scan *scan, const tactus_reading *readings, size_t n)
-{
-	const double *force = tactus_table_numbers(scan->table, "force_estimate_N");
-	size_t *counts = calloc(n, sizeof *counts);
-	scan->tare_channels = calloc(n, sizeof *scan->tare_channels);
-	scan->tare_N = calloc(n, sizeof *scan->tare_N);
-	for (size_t i = 0; i < n && force && counts && scan->tare_channels && scan->tare_N; i++) {
-		double *tare = tare_of(scan, readings[i].channel);
-		if (isnan(force[i]))
-			continue;
-		if (!tare) {
-			tare = &scan->tare_N[scan->tare_count];
-			scan->tare_channels[scan->tare_count++] = readings[i].channel;
-		}
-		const size_t k = (size_t)(tare - scan->tare_N);
-		*tare += (force[i] - *tare) / (double)++counts[k];
-	}
-	const bool done = counts && scan->tare_channels && scan->tare_N;
-	free(counts);
-	return done ? 0 : TACTUS_ERR_MEMORY;
-}
-
-static int subtract_tare(struct scan *scan, const tactus_reading *readings, size_t n)
-{
-	const double *estimate = tactus_table_numbers(scan->table, "force_estimate_N");
-	double *values = malloc(n * sizeof *values);
-	if (!values || !estimate) {
-		free(values);
-		return values ? 0 : TACTUS_ERR_MEMORY;
-	}
-	for (size_t i = 0; i < n; i++) {
-		const double *tare = tare_of(scan, readings[i].channel);
-		values[i] = estimate[i] - (tare ? *tare : 0);
-	}
-	double *column = tactus_table_set_numbers(scan->table, "force_estimate_N");
-	if (column)
-		memcpy(column, values, n * sizeof *values);
-	free(values);
-	return column ? 0 : TACTUS_ERR_MEMORY;
-}
-
 static void count_scans(struct scan *scan, const tactus_reading *readings, size_t n)
 {
 	for (size_t i = 0; i < n; i++) {
@@ -248,9 +197,9 @@ static int put(struct scan *scan, tactus_reading *readings, size_t n, bool first
 	if (!error && scan->estimator)
 		error = tactus_estimator_block(scan->estimator, scan->table);
 	if (!error && first_second)
-		error = find_tare(scan, readings, n);
-	if (!error && scan->tare_count)
-		error = subtract_tare(scan, readings, n);
+		error = cli_tare_find(&scan->tare, scan->table, readings, n);
+	if (!error)
+		error = cli_tare_subtract(&scan->tare, scan->table, readings, n);
 	if (!error)
 		error = tactus_writer_rows(scan->writer, scan->table);
 	return error ? error : tactus_writer_flush(scan->writer);
@@ -377,8 +326,7 @@ static void free_scan(struct scan *scan)
 	tactus_table_free(scan->table);
 	tactus_device_close(scan->device);
 	tactus_model_free(scan->model);
-	free(scan->tare_channels);
-	free(scan->tare_N);
+	cli_tare_free(&scan->tare);
 }
 
 static int check_usage(const struct cli *cli)
