@@ -19,6 +19,12 @@
 
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
+static const double pi = 3.14159265358979323846;
+
+/* Base parameters of the first sensors of sim:paredes, as its file states them. */
+static const double g0[] = {0, 0.6e-6, 0.4e-6}, g1[] = {0, 1.62e-6, 1.85e-6};
+static const double c0[] = {0, 150e-12, 210e-12}, c1[] = {0, 2.55e-12, 2.6e-12};
+
 #define assert_near(a, b, tolerance)                                                                                   \
 	do {                                                                                                               \
 		const double a_ = (a), b_ = (b), t_ = (tolerance);                                                             \

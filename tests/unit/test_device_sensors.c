@@ -1,12 +1,6 @@
 /* Press, films and effects of the simulated bench: each leaves the mark that its equation says, and no other. */
 #include "device_rig.h"
 
-static const double pi = 3.14159265358979323846;
-
-/* Base parameters of the first sensors of sim:paredes, as its file states them. */
-static const double g0[] = {0, 0.6e-6, 0.4e-6}, g1[] = {0, 1.62e-6, 1.85e-6};
-static const double c0[] = {0, 150e-12, 210e-12}, c1[] = {0, 2.55e-12, 2.6e-12};
-
 static void test_the_reference_has_its_noise_resolution_and_latency(void **state)
 {
 	(void)state;

@@ -1,12 +1,6 @@
 /* The simulated bench: what is measured is what the circuit's equations say, seed by seed to the last bit. */
 #include "device_rig.h"
 
-static const double pi = 3.14159265358979323846;
-
-/* Base parameters of the first sensors of sim:paredes, as its file states them. */
-static const double g0[] = {0, 0.6e-6, 0.4e-6}, g1[] = {0, 1.62e-6, 1.85e-6};
-static const double c0[] = {0, 150e-12, 210e-12}, c1[] = {0, 2.55e-12, 2.6e-12};
-
 static void test_the_same_seed_gives_the_same_bytes_whatever_the_blocks(void **state)
 {
 	(void)state;
