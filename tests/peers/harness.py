@@ -5,6 +5,7 @@ import datetime
 import os
 import pathlib
 import re
+import resource
 import subprocess
 import time
 
@@ -38,6 +39,15 @@ def command(arguments, **options):
     if done.returncode:
         raise SystemExit(f"{' '.join(map(str, arguments))}: status {done.returncode}\n{done.stderr}")
     return int(re.findall(r"peak (\d+)", done.stderr)[-1]) / 1024
+
+
+def cpu_seconds(arguments):
+    """Seconds of processor time, user and system, that a command takes in all its threads."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(list(map(str, arguments)), check=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                   stderr=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
 class Table:
