@@ -77,6 +77,23 @@ enum tactus_effect_flags {
 	TACTUS_EFFECT_ORDER = 16      /* has memory: not testable when the order of the rows is unknown */
 };
 
+/* What a linear look at the neutral value cannot find: a diagnosis tries these values of a parameter first. */
+enum tactus_search_kind {
+	TACTUS_SEARCH_TIME, /* time constants, from the step of the clock to the duration; both signs where the bounds are
+						 */
+	TACTUS_SEARCH_INSTANT, /* instants within the recording */
+	TACTUS_SEARCH_VALUES,  /* those of `values`; they scale with the ranges as `start` does */
+	TACTUS_SEARCH_PROPOSED /* what `propose` reads off the series */
+};
+
+typedef struct {
+	size_t parameter;
+	enum tactus_search_kind kind;
+	double values[6];
+	size_t count;
+	int term; /* parameters of one term go together; a further term is added if it helps (step 2, 3, …) */
+} tactus_search;
+
 /* What a series has to offer: n samples of every signal of the domain, after columns were mapped; see series.h. */
 struct tactus_series;
 
@@ -99,6 +116,15 @@ struct tactus_effect {
 	void (*process)(const double *parameters, double *state, size_t n, double *const *signal);
 	/* NULL if the series can test it, else why not (a literal). May not be NULL. */
 	const char *(*testable)(const struct tactus_series *series);
+	const tactus_search *searches; /* NULL if there are none */
+	size_t search_count;
+	int (*term)(size_t parameter); /* the term that a parameter belongs to, from 0; NULL: all of them to 0 */
+	/* Values that a TACTUS_SEARCH_PROPOSED parameter may have in this series, at most `most`; NULL if there is none. */
+	size_t (*propose)(const struct tactus_series *series, size_t parameter, double *values, size_t most);
+	/* A cause outside this catalogue with exactly the same mark: its name, and what separates them; NULL if none. */
+	const char *twin, *twin_separated_by;
+	/* True if the recording's metadata or columns exclude the twin. NULL: nothing can. */
+	bool (*twin_excluded)(const struct tactus_series *series, const tactus_metadata *metadata);
 };
 
 /* True if every strength is at its neutral value: the chain then skips the effect. */

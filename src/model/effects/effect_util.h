@@ -18,6 +18,8 @@
 /* Parameters of one effect, and their count, for the const struct. */
 #define TACTUS_PARAMETERS(table) .parameters = (table), .parameter_count = sizeof(table) / sizeof((table)[0])
 
+#define TACTUS_SEARCHES(table) .searches = (table), .search_count = sizeof(table) / sizeof((table)[0])
+
 /* An effect's memory of the clock: NaN before the first sample. */
 static inline bool tactus_first(double last_s)
 {

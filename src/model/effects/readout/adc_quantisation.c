@@ -1,4 +1,6 @@
 /* adc-quantisation: the converter has too few bits for the range, beyond the declared ones. */
+#include <stdlib.h>
+
 #include "model/effects/effect_util.h"
 
 enum { AMPLITUDE_STEP, PHASE_STEP };
@@ -28,6 +30,53 @@ static const char *testable(const tactus_series *series)
 	return NULL;
 }
 
+static int ascending(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}
+
+/* The step that all values are whole multiples of; 0 if there is none, or so many steps that it is no coarse one. */
+static double lattice(double *values, size_t n)
+{
+	double step = INFINITY, largest = 0;
+	qsort(values, n, sizeof *values, ascending);
+	for (size_t i = 0; i < n; i++)
+		largest = fmax(largest, fabs(values[i]));
+	for (size_t i = 1; i < n; i++)
+		if (values[i] - values[i - 1] > 1e-9 * largest)
+			step = fmin(step, values[i] - values[i - 1]);
+	double steps = round(largest / step);
+	if (!(steps >= 2) || steps > 5e4)
+		return 0;
+	step = largest / steps;
+	for (size_t i = 0; i < n; i++)
+		if (fabs(values[i] / step - round(values[i] / step)) > 0.02)
+			return 0;
+	return step;
+}
+
+static size_t propose(const tactus_series *series, size_t parameter, double *values, size_t most)
+{
+	const double *reading = series->signal[parameter == PHASE_STEP ? READOUT_PHASE : READOUT_AMPLITUDE];
+	double *sorted = reading && most > 0 ? malloc((series->n + 1) * sizeof *sorted) : NULL;
+	size_t n = 0;
+	for (size_t i = 0; sorted && i < series->n; i++)
+		if (!isnan(reading[i]))
+			sorted[n++] = reading[i];
+	values[0] = sorted && n > 8 ? lattice(sorted, n) : 0;
+	free(sorted);
+	return values[0] > 0;
+}
+
+static int term(size_t parameter)
+{
+	return (int)parameter;
+}
+
+static const tactus_search searches[] = {{AMPLITUDE_STEP, TACTUS_SEARCH_PROPOSED, {0}, 0, 0},
+										 {PHASE_STEP, TACTUS_SEARCH_PROPOSED, {0}, 0, 1}};
+
 const struct tactus_effect tactus_effect_readout_adc_quantisation = {
 	.name = "adc-quantisation",
 	.summary = "the converter has too few bits for the range",
@@ -38,5 +87,8 @@ const struct tactus_effect tactus_effect_readout_adc_quantisation = {
 	.stage = READOUT_STAGE_SEQUENCE,
 	TACTUS_PARAMETERS(parameters),
 	.process = process,
+	TACTUS_SEARCHES(searches),
+	.term = term,
+	.propose = propose,
 	.testable = testable,
 };

@@ -44,6 +44,21 @@ static const char *testable(const tactus_series *series)
 	return NULL;
 }
 
+/* Levels from just below the largest reading down to a quarter of it; an averaging rectifier shows up to π/2 more. */
+static size_t propose(const tactus_series *series, size_t parameter, double *values, size_t most)
+{
+	double least, largest;
+	if (parameter != INVERSE_LEVEL ||
+		!tactus_magnitudes(series, READOUT_AMPLITUDE, READOUT_AMPLITUDE, &least, &largest))
+		return 0;
+	for (size_t i = 0; i < most; i++)
+		values[i] = 1 / (largest * (1.01 - 0.76 * (double)i / (double)most));
+	return most;
+}
+
+static const tactus_search searches[] = {{AVERAGING, TACTUS_SEARCH_VALUES, {1, 0}, 2, 0},
+										 {INVERSE_LEVEL, TACTUS_SEARCH_PROPOSED, {0}, 0, 0}};
+
 const struct tactus_effect tactus_effect_readout_output_clipping = {
 	.name = "output-clipping",
 	.summary = "the amplifier's output or the ADC saturates",
@@ -54,5 +69,7 @@ const struct tactus_effect tactus_effect_readout_output_clipping = {
 	.stage = READOUT_STAGE_DETECTOR,
 	TACTUS_PARAMETERS(parameters),
 	.process = process,
+	TACTUS_SEARCHES(searches),
+	.propose = propose,
 	.testable = testable,
 };

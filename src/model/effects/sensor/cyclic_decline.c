@@ -35,6 +35,8 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 	tactus_cycles_process(p, state, n, signal, decline);
 }
 
+static const tactus_search searches[] = {{HALF_AMPLITUDE, TACTUS_SEARCH_VALUES, {0.05, 0.2, 1}, 3, 0}};
+
 const struct tactus_effect tactus_effect_sensor_cyclic_decline = {
 	.name = "cyclic-decline",
 	.summary = "sensitivity is lost, exponentially, while the load cycles; the minima stay",
@@ -50,5 +52,6 @@ const struct tactus_effect tactus_effect_sensor_cyclic_decline = {
 	.state_size = CYCLES_STATES,
 	.reset = tactus_cycles_reset,
 	.process = process,
+	TACTUS_SEARCHES(searches),
 	.testable = tactus_cycles_testable,
 };

@@ -35,6 +35,8 @@ static const char *testable(const tactus_series *series)
 	return why ? why : tactus_series_duration_s(series) > 0 ? NULL : "time_s never advances";
 }
 
+static const tactus_search searches[] = {{EXPONENT, TACTUS_SEARCH_VALUES, {0.3, 0.6, 1, 2}, 4, 0}};
+
 const struct tactus_effect tactus_effect_sensor_drift = {
 	.name = "drift",
 	.summary = "offset or sensitivity wanders with time, whatever the load",
@@ -48,5 +50,6 @@ const struct tactus_effect tactus_effect_sensor_drift = {
 	.flags = TACTUS_EFFECT_CLOCK,
 	TACTUS_PARAMETERS(parameters),
 	.process = process,
+	TACTUS_SEARCHES(searches),
 	.testable = testable,
 };

@@ -76,6 +76,14 @@ static const char *testable(const tactus_series *series)
 	return why ? why : tactus_want_reversal(series);
 }
 
+/* The film and the play operators are two forms of one cause. */
+static int term(size_t parameter)
+{
+	return parameter >= WEIGHT && parameter != INITIAL_BRANCH;
+}
+
+static const tactus_search searches[] = {{RATIO, TACTUS_SEARCH_VALUES, {0.3, 0.6, 0.9}, 3, 0}};
+
 const struct tactus_effect tactus_effect_sensor_hysteresis = {
 	.name = "hysteresis",
 	.summary = "rate-independent friction: the output is higher on unloading than on loading",
@@ -90,5 +98,7 @@ const struct tactus_effect tactus_effect_sensor_hysteresis = {
 	.state_size = STATES,
 	.reset = reset,
 	.process = process,
+	TACTUS_SEARCHES(searches),
+	.term = term,
 	.testable = testable,
 };

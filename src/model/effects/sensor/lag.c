@@ -43,6 +43,8 @@ static const char *testable(const tactus_series *series)
 	return tactus_want_force_range(series);
 }
 
+static const tactus_search searches[] = {{TIME_CONSTANT, TACTUS_SEARCH_TIME, {0}, 0, 0}};
+
 const struct tactus_effect tactus_effect_sensor_lag = {
 	.name = "lag",
 	.summary = "the film answers as a first-order system",
@@ -57,5 +59,6 @@ const struct tactus_effect tactus_effect_sensor_lag = {
 	.state_size = STATES,
 	.reset = reset,
 	.process = process,
+	TACTUS_SEARCHES(searches),
 	.testable = testable,
 };

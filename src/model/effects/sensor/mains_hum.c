@@ -45,6 +45,8 @@ static const char *testable(const tactus_series *series)
 			   : "fewer than two cycles of the mains or its alias: the sampling is in step with it, or too short";
 }
 
+static const tactus_search searches[] = {{FREQUENCY, TACTUS_SEARCH_VALUES, {50, 60}, 2, 0}};
+
 const struct tactus_effect tactus_effect_sensor_mains_hum = {
 	.name = "mains-hum",
 	.summary = "the mains, or its alias, is in the output",
@@ -57,5 +59,6 @@ const struct tactus_effect tactus_effect_sensor_mains_hum = {
 	.flags = TACTUS_EFFECT_CLOCK,
 	TACTUS_PARAMETERS(parameters),
 	.process = process,
+	TACTUS_SEARCHES(searches),
 	.testable = testable,
 };

@@ -15,6 +15,13 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 		force[i] /= 1 + p[0] * fabs(force[i]);
 }
 
+/* A scan that states the switch's resistance has had it removed by `convert`. */
+static bool series_resistance_known(const tactus_series *series, const tactus_metadata *metadata)
+{
+	(void)series;
+	return tactus_metadata_get(metadata, "switch_resistance_ohm") != NULL;
+}
+
 const struct tactus_effect tactus_effect_sensor_saturation = {
 	.name = "saturation",
 	.summary = "the ink is fully compressed at high load: the output approaches an asymptote",
@@ -26,5 +33,8 @@ const struct tactus_effect tactus_effect_sensor_saturation = {
 	.stage = SENSOR_STAGE_INPUT,
 	TACTUS_PARAMETERS(parameters),
 	.process = process,
+	.twin = "switch-resistance",
+	.twin_separated_by = "known resistors in place of the sensor, on the same channel",
+	.twin_excluded = series_resistance_known,
 	.testable = tactus_want_force_range,
 };

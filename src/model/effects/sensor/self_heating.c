@@ -51,6 +51,8 @@ static const char *testable(const tactus_series *series)
 			   : "drive_V never changes";
 }
 
+static const tactus_search searches[] = {{TIME_CONSTANT, TACTUS_SEARCH_TIME, {0}, 0, 0}};
+
 const struct tactus_effect tactus_effect_sensor_self_heating = {
 	.name = "self-heating",
 	.summary = "the drive's power warms the ink, which changes its conductance",
@@ -66,5 +68,6 @@ const struct tactus_effect tactus_effect_sensor_self_heating = {
 	.state_size = STATES,
 	.reset = reset,
 	.process = process,
+	TACTUS_SEARCHES(searches),
 	.testable = testable,
 };

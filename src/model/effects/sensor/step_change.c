@@ -42,6 +42,16 @@ static const char *testable(const tactus_series *series)
 	return why ? why : tactus_series_duration_s(series) > 0 ? NULL : "time_s never advances";
 }
 
+static int term(size_t parameter)
+{
+	return (int)(parameter / PER_STEP);
+}
+
+static const tactus_search searches[] = {{TIME, TACTUS_SEARCH_INSTANT, {0}, 0, 0},
+										 {PER_STEP + TIME, TACTUS_SEARCH_INSTANT, {0}, 0, 1},
+										 {2 * PER_STEP + TIME, TACTUS_SEARCH_INSTANT, {0}, 0, 2},
+										 {3 * PER_STEP + TIME, TACTUS_SEARCH_INSTANT, {0}, 0, 3}};
+
 const struct tactus_effect tactus_effect_sensor_step_change = {
 	.name = "step-change",
 	.summary = "a contact jumps, or a puck is put back elsewhere: offset and sensitivity change at once and stay",
@@ -53,5 +63,7 @@ const struct tactus_effect tactus_effect_sensor_step_change = {
 	.flags = TACTUS_EFFECT_CLOCK,
 	TACTUS_PARAMETERS(parameters),
 	.process = process,
+	TACTUS_SEARCHES(searches),
+	.term = term,
 	.testable = testable,
 };

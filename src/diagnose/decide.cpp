@@ -1,0 +1,542 @@
+/* Forward selection, backward pass, exchange; rivals; adequacy; staleness. No effect is known by name here. */
+#include "diagnose/decide.hpp"
+
+#include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <cmath>
+#include <cstring>
+
+namespace tactus::explain
+{
+
+const Limits limits;
+
+double paired(const Problem &problem, const std::vector<double> &a, const std::vector<double> &b)
+{
+	double sum = 0, square = 0, n = 0;
+	for (size_t k = 0; k < a.size(); k++) {
+		if (problem.test[k] || (a[k] == 0 && b[k] == 0))
+			continue;
+		const double d = a[k] - b[k];
+		sum += d;
+		square += d * d;
+		n++;
+	}
+	if (n < 3)
+		return 0;
+	const double mean = sum / n, variance = (square / n - mean * mean) * n / (n - 1);
+	return variance > 0 ? mean / std::sqrt(variance / n) : sum > 0 ? INFINITY : 0;
+}
+
+namespace
+{
+
+double f_test(double gain, double rest, double k, double n)
+{
+	if (!(gain > 0) || !(rest > 0) || !(n > 0) || !(k > 0))
+		return 1;
+	const double f = gain / k / (rest / n);
+	return std::isfinite(f) ? boost::math::cdf(boost::math::complement(boost::math::fisher_f(k, n), f)) : 0;
+}
+
+/* Strengths that went back to where they change nothing are taken out; false if one ran against its other bound. */
+bool drop_idle(Hypothesis &h, const tactus_effect *effect, bool &changed)
+{
+	for (Part &part : h.parts) {
+		if (part.effect != effect)
+			continue;
+		std::vector<size_t> kept;
+		bool strength = false;
+		for (const size_t p : part.free) {
+			const tactus_parameter &info = effect->parameters[p];
+			const bool at_bound = part.value[p] <= info.lower || part.value[p] >= info.upper;
+			if (info.kind == TACTUS_STRENGTH && part.value[p] == info.neutral && at_bound) {
+				changed = true;
+				continue;
+			}
+			if (info.kind == TACTUS_STRENGTH && at_bound)
+				return false;
+			if (info.kind != TACTUS_STRENGTH && at_bound) { /* as good as stated */
+				changed = true;
+				continue;
+			}
+			strength = strength || info.kind == TACTUS_STRENGTH;
+			kept.push_back(p);
+		}
+		part.free = kept;
+		return strength;
+	}
+	return false;
+}
+
+} // namespace
+
+Fit join(const Problem &problem, const Fit &fit, const Part &part)
+{
+	Hypothesis h = fit.hypothesis;
+	h.add(problem.domain, part);
+	Fit best = problem.fit(h, Rows::train);
+	for (int round = 0; round < 6 && best.ok; round++) {
+		bool changed = false;
+		Hypothesis next = best.hypothesis;
+		if (!drop_idle(next, part.effect, changed)) {
+			best.ok = false;
+			return best;
+		}
+		if (changed) {
+			best = problem.fit(next, Rows::train);
+			continue;
+		}
+		const Part more = Screen(problem, best).refine(part.effect);
+		next = best.hypothesis;
+		next.remove(part.effect);
+		next.add(problem.domain, more);
+		const Part *now = nullptr;
+		for (const Part &p : best.hypothesis.parts)
+			if (p.effect == part.effect)
+				now = &p;
+		if (more.free == now->free)
+			break;
+		Fit grown = problem.fit(next, Rows::train);
+		if (!grown.ok || !(grown.cost < best.cost - 4))
+			break;
+		best = grown;
+	}
+	return best;
+}
+
+namespace
+{
+
+/* Whitened, masked columns of a fit's Jacobian and a group, scaled to length 1. */
+MatrixXd masked(const Problem &problem, const MatrixXd &jacobian, const MatrixXd &columns, bool whiten)
+{
+	MatrixXd all(problem.rows(), jacobian.cols() + columns.cols());
+	for (Index j = 0; j < all.cols(); j++) {
+		VectorXd c = j < jacobian.cols() ? VectorXd(jacobian.col(j)) : VectorXd(columns.col(j - jacobian.cols()));
+		if (whiten && j >= jacobian.cols())
+			c = problem.whiten(c);
+		problem.mask(c, Rows::train);
+		all.col(j) = c / std::fmax(c.norm(), 1e-300);
+	}
+	return all;
+}
+
+/* Held-out squares of a regression of r on columns, folds of blocks left out in turn, against those of r alone. */
+double held_out_share(const Problem &problem, const MatrixXd &columns, const VectorXd &r)
+{
+	const Index q = columns.cols();
+	MatrixXd gram[8];
+	VectorXd product[8];
+	std::vector<Index> member[8];
+	for (Index i = 0; i < problem.rows(); i++)
+		if (problem.trains(i, Rows::train))
+			member[size_t(problem.fold[size_t(problem.block[size_t(i)])])].push_back(i);
+	MatrixXd all = MatrixXd::Zero(q, q);
+	VectorXd right = VectorXd::Zero(q);
+	for (int f = 0; f < 8; f++) {
+		MatrixXd part(Index(member[f].size()), q);
+		VectorXd values(Index(member[f].size()));
+		for (size_t i = 0; i < member[f].size(); i++) {
+			part.row(Index(i)) = columns.row(member[f][i]);
+			values[Index(i)] = r[member[f][i]];
+		}
+		gram[f] = part.transpose() * part;
+		product[f] = part.transpose() * values;
+		all += gram[f];
+		right += product[f];
+	}
+	double before = 0, after = 0;
+	for (int f = 0; f < 8; f++) {
+		if (member[f].empty())
+			continue;
+		MatrixXd left = all - gram[f];
+		left.diagonal().array() += 1e-4; /* columns have length 1: a slight ridge keeps empty bins at 0 */
+		const VectorXd b = left.ldlt().solve(right - product[f]);
+		for (const Index i : member[f]) {
+			before += r[i] * r[i];
+			after += std::pow(r[i] - columns.row(i).dot(b), 2);
+		}
+	}
+	return before > 0 ? 1 - after / before : 0;
+}
+
+} // namespace
+
+Dependence dependence(const Problem &problem, const Fit &fit, const Group &group)
+{
+	Dependence result{&group, 0, 0, 1};
+	VectorXd r = fit.residual;
+	problem.mask(r, Rows::train);
+	const MatrixXd columns = masked(problem, fit.jacobian, group.columns, true);
+	const MatrixXd gram = columns.transpose() * columns;
+	const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
+	const VectorXd b = eigen.eigenvectors().transpose() * (columns.transpose() * r);
+	double gain = 0, k = 0;
+	for (Index j = 0; j < b.size(); j++)
+		if (eigen.eigenvalues()[j] > 1e-8 * double(b.size())) {
+			gain += b[j] * b[j] / eigen.eigenvalues()[j];
+			k++;
+		}
+	const double square = r.squaredNorm(), own = k - double(fit.jacobian.cols());
+	result.p_value = f_test(gain, square - gain, std::fmax(own, 1), double(problem.training) - k);
+	result.whitened = held_out_share(problem, columns, r);
+	VectorXd y;
+	problem.simulate(fit.hypothesis, y);
+	VectorXd raw = problem.measured - y;
+	problem.mask(raw, Rows::train);
+	result.explained = std::clamp(
+		held_out_share(problem, masked(problem, MatrixXd(r.size(), 0), group.columns, false), raw), 0.0, 1.0);
+	return result;
+}
+
+namespace
+{
+
+class Decider
+{
+  public:
+	explicit Decider(const Evidence &e) : evidence(e), problem(*e.problem)
+	{
+	}
+	Decision run();
+
+  private:
+	bool testable(const tactus_effect *effect) const
+	{
+		return effect->testable(problem.segments.front()) == nullptr;
+	}
+	std::vector<Scored> screen(const Fit &fit, bool all) const;
+	Fit best_next(const Fit &fit, const tactus_effect **effect) const;
+	bool stands(const Fit &with, const Fit &without, double removed) const;
+	Fit without(const Fit &fit, const tactus_effect *effect) const;
+	void select();
+	void prune();
+	void exchange();
+	void find_rivals();
+	void adequacy();
+	void staleness();
+	bool needless(const Group &group) const;
+	std::vector<Dependence> map(const Fit &fit) const;
+	enum tactus_verdict verdict() const;
+
+	const Evidence &evidence;
+	const Problem &problem;
+	Decision d;
+};
+
+/* Every candidate that is not in the fit, best first. */
+std::vector<Scored> Decider::screen(const Fit &fit, bool all) const
+{
+	const Screen screen(problem, fit);
+	std::vector<Scored> scored;
+	for (size_t i = 0; problem.domain->effects[i]; i++) {
+		const tactus_effect *effect = problem.domain->effects[i];
+		if (fit.hypothesis.has(effect) || (!all && !testable(effect)))
+			continue;
+		scored.push_back(screen.score(effect));
+	}
+	std::sort(scored.begin(), scored.end(), [](const Scored &a, const Scored &b) { return a.cost < b.cost; });
+	return scored;
+}
+
+/* The best of the few that look best, fitted jointly. */
+Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
+{
+	Fit best;
+	*effect = nullptr;
+	size_t tried = 0;
+	for (const Scored &s : screen(fit, false)) {
+		if (tried == limits.tried || !(s.cost < 0) || s.part.free.empty())
+			break;
+		tried++;
+		const Fit joined = join(problem, fit, s.part);
+		if (joined.ok && (!best.ok || joined.cost < best.cost)) {
+			best = joined;
+			*effect = s.part.effect;
+		}
+	}
+	return best;
+}
+
+bool Decider::stands(const Fit &with, const Fit &without, double removed) const
+{
+	const double gain = without.square - with.square;
+	return with.ok && without.cost - with.cost > limits.evidence && gain > limits.share * without.square &&
+		   gain > limits.further_share * (removed + gain) &&
+		   paired(problem, problem.held_out(without), problem.held_out(with)) > limits.paired;
+}
+
+Fit Decider::without(const Fit &fit, const tactus_effect *effect) const
+{
+	Hypothesis h = fit.hypothesis;
+	h.remove(effect);
+	return problem.fit(h, Rows::train);
+}
+
+void Decider::select()
+{
+	d.final = d.base;
+	while (d.causes.size() < limits.causes) {
+		const tactus_effect *effect;
+		const Fit next = best_next(d.final, &effect);
+		if (!effect || !stands(next, d.final, d.base.square - d.final.square))
+			return;
+		d.final = next;
+		d.causes.push_back({effect, {}, 0, 1, {}});
+	}
+}
+
+/* A cause that the later ones made needless goes. */
+void Decider::prune()
+{
+	for (bool again = true; again && d.causes.size() > 1;) {
+		again = false;
+		for (size_t i = 0; i < d.causes.size(); i++) {
+			const Fit left = without(d.final, d.causes[i].effect);
+			if (!left.ok || stands(d.final, left, d.base.square - left.square))
+				continue;
+			d.final = left;
+			d.causes.erase(d.causes.begin() + long(i));
+			again = true;
+			break;
+		}
+	}
+}
+
+/* Each cause in turn gives way to whatever does better in its place: the first one was chosen without the others. */
+void Decider::exchange()
+{
+	for (size_t i = 0; d.causes.size() > 1 && i < d.causes.size(); i++) {
+		const Fit left = without(d.final, d.causes[i].effect);
+		if (!left.ok)
+			continue;
+		const tactus_effect *effect;
+		const Fit other = best_next(left, &effect);
+		if (effect && effect != d.causes[i].effect && other.cost < d.final.cost - limits.margin) {
+			d.final = other;
+			d.causes[i].effect = effect;
+		}
+	}
+}
+
+void Decider::find_rivals()
+{
+	for (Cause &cause : d.causes) {
+		cause.without = without(d.final, cause.effect);
+		cause.delta = d.final.cost - cause.without.cost;
+		const double k = double(d.final.slots.size() - std::min(d.final.slots.size(), cause.without.slots.size()));
+		cause.p_value = f_test(cause.without.square - d.final.square, d.final.square, std::fmax(k, 1),
+							   double(problem.training) - double(d.final.slots.size()));
+		const std::vector<double> ours = problem.held_out(d.final);
+		size_t tried = 0;
+		for (const Scored &s : screen(cause.without, true)) {
+			if (s.part.effect == cause.effect || d.final.hypothesis.has(s.part.effect))
+				continue;
+			if (tried == limits.tried || s.part.free.empty() || !(s.cost < 0.3 * cause.delta))
+				break;
+			tried++;
+			const Fit other = join(problem, cause.without, s.part);
+			if (!other.ok)
+				continue;
+			const bool margin = other.cost - d.final.cost > limits.margin &&
+								paired(problem, problem.held_out(other), ours) > limits.paired;
+			cause.rivals.push_back({s.part.effect, s.part.effect->name, other.cost - cause.without.cost,
+									testable(s.part.effect), !margin});
+		}
+		std::sort(cause.rivals.begin(), cause.rivals.end(), [](const Rival &a, const Rival &b) {
+			return a.inseparable != b.inseparable ? a.inseparable : a.delta < b.delta;
+		});
+		const tactus_effect *e = cause.effect;
+		if (e->twin && !(e->twin_excluded && e->twin_excluded(problem.segments.front(), evidence.metadata)))
+			cause.rivals.insert(cause.rivals.begin(), {nullptr, e->twin, cause.delta, false, true});
+	}
+	std::sort(d.causes.begin(), d.causes.end(), [](const Cause &a, const Cause &b) { return a.delta < b.delta; });
+}
+
+std::vector<Dependence> Decider::map(const Fit &fit) const
+{
+	std::vector<Dependence> found;
+	for (const Group &group : evidence.groups) {
+		const Dependence dep = dependence(problem, fit, group);
+		if (!(dep.p_value * double(evidence.groups.size()) < limits.structure_p) || !(dep.whitened > limits.structure))
+			continue;
+		auto same = std::find_if(found.begin(), found.end(),
+								 [&](const Dependence &f) { return f.group->covariate == group.covariate; });
+		if (same == found.end())
+			found.push_back(dep);
+		else if (dep.whitened > same->whitened)
+			*same = dep;
+	}
+	std::sort(found.begin(), found.end(),
+			  [](const Dependence &a, const Dependence &b) { return a.whitened > b.whitened; });
+	return found;
+}
+
+/* True if the causes have nothing to say that an unknown column does not say better. */
+bool Decider::needless(const Group &group) const
+{
+	VectorXd y0, y1, r = d.base.residual;
+	problem.simulate(d.base.hypothesis, y0);
+	problem.simulate(d.final.hypothesis, y1);
+	problem.mask(r, Rows::train);
+	MatrixXd with(problem.rows(), group.columns.cols() + 1);
+	with << group.columns, y1 - y0;
+	auto left = [&](const MatrixXd &columns) {
+		const MatrixXd all = masked(problem, d.base.jacobian, columns, true);
+		MatrixXd gram = all.transpose() * all;
+		gram.diagonal().array() += 1e-9;
+		const VectorXd b = all.transpose() * r;
+		return r.squaredNorm() - b.dot(gram.ldlt().solve(b));
+	};
+	const double n = double(problem.training), alone = left(group.columns), both = left(with);
+	const double own = double(d.final.slots.size() - d.base.slots.size());
+	return n * std::log(std::fmax(both, 1e-300) / alone) + own * std::log(n) > -limits.evidence ||
+		   alone - both < limits.share * alone;
+}
+
+void Decider::adequacy()
+{
+	d.left = map(d.final);
+	d.structure = !d.left.empty();
+	if (d.causes.empty())
+		return;
+	for (const Dependence &dep : map(d.base))
+		if (dep.group->unknown && needless(*dep.group)) {
+			d.causes.clear();
+			d.final = d.base;
+			d.left = map(d.base);
+			d.structure = true;
+			return;
+		}
+	/* What causes explain must be most of what can be explained at all. */
+	double most = 0;
+	for (const Dependence &dep : d.left)
+		most = std::fmax(most, dep.whitened * d.final.square);
+	if (most > 0 && d.base.square - d.final.square < limits.half * (d.base.square - d.final.square + most)) {
+		d.causes.clear();
+		d.final = d.base;
+		d.left = map(d.base);
+		d.structure = true;
+	}
+}
+
+/* ---- a stale calibration ---- */
+
+void Decider::staleness()
+{
+	if (!evidence.given)
+		return;
+	d.given = problem.evaluate(*evidence.given, Rows::train);
+	if (!d.given.ok || !d.causes.empty())
+		return;
+	Hypothesis fixed = *evidence.given;
+	fixed.base_free.clear();
+	for (Part &part : fixed.parts)
+		part.free.clear();
+	const Fit as_is = problem.evaluate(fixed, Rows::train);
+	Fit now = as_is;
+	const std::vector<Slot> all = problem.slots(*evidence.given);
+	for (;;) { /* one parameter at a time, the one that explains most */
+		Fit best;
+		Slot pick{};
+		for (const Slot &slot : all) {
+			Hypothesis h = now.hypothesis;
+			std::vector<size_t> &free = slot.part < 0 ? h.base_free : h.parts[size_t(slot.part)].free;
+			if (std::find(free.begin(), free.end(), slot.index) != free.end())
+				continue;
+			free.push_back(slot.index);
+			const Fit f = problem.fit(h, Rows::train);
+			if (f.ok && (!best.ok || f.cost < best.cost)) {
+				best = f;
+				pick = slot;
+			}
+		}
+		if (!best.ok || !(now.cost - best.cost > limits.evidence) ||
+			!(now.square - best.square > limits.share * best.square) ||
+			!(now.square - best.square > 0.02 * (as_is.square - best.square)))
+			break;
+		d.moved.slots.push_back(pick);
+		now = best;
+	}
+	d.moved.fit = now;
+	d.moved.delta = now.cost - as_is.cost;
+	d.stale = !d.moved.slots.empty();
+	if (!d.stale)
+		return;
+	/* Effects that do the same to the model as given: those that a recording of constant conditions cannot test. */
+	const Screen screen(problem, as_is);
+	for (size_t i = 0; problem.domain->effects[i]; i++) {
+		const tactus_effect *effect = problem.domain->effects[i];
+		if (as_is.hypothesis.has(effect))
+			continue;
+		const int column = [&] {
+			for (size_t s = 0; s < problem.domain->signal_count; s++)
+				if (strcmp(problem.domain->signals[s].name, effect->covariate) == 0 &&
+					problem.domain->signals[s].role == TACTUS_ROLE_COVARIATE)
+					return int(s);
+			return -1;
+		}();
+		/* The calibration says that it was made under the same conditions: then these changed nothing. */
+		double then;
+		if (column >= 0 && evidence.provenance &&
+			tactus_metadata_get_number(evidence.provenance, effect->covariate, &then) == 1 &&
+			std::abs(tactus_series_maximum(problem.segments.front(), column) - then) <= 0.01 * std::abs(then) + 1e-9)
+			continue;
+		if (testable(effect))
+			continue;
+		const Scored s = screen.score(effect);
+		if (s.part.free.empty() || !(s.cost < d.moved.delta + 3 * limits.margin))
+			continue;
+		const Fit other = join(problem, as_is, s.part);
+		if (other.ok && other.cost - now.cost < limits.margin)
+			d.moved.rivals.push_back({effect, effect->name, other.cost - as_is.cost, false, true});
+	}
+}
+
+enum tactus_verdict Decider::verdict() const
+{
+	if (!d.causes.empty()) {
+		const std::vector<Rival> &rivals = d.causes.front().rivals;
+		const bool open = std::any_of(rivals.begin(), rivals.end(), [](const Rival &r) { return r.inseparable; });
+		return open ? TACTUS_VERDICT_AMBIGUOUS : TACTUS_VERDICT_CAUSE_FOUND;
+	}
+	if (d.structure)
+		return TACTUS_VERDICT_UNEXPLAINED;
+	if (d.stale)
+		return d.moved.rivals.empty() ? TACTUS_VERDICT_STALE_CALIBRATION : TACTUS_VERDICT_AMBIGUOUS;
+	return TACTUS_VERDICT_NOTHING_WRONG;
+}
+
+Decision Decider::run()
+{
+	d.base = problem.fit(evidence.base, Rows::train);
+	if (!d.base.ok) {
+		d.verdict = TACTUS_VERDICT_BAD_RECORDING;
+		return d;
+	}
+	const Screen on_base(problem, d.base);
+	for (size_t i = 0; problem.domain->effects[i]; i++) {
+		const tactus_effect *effect = problem.domain->effects[i];
+		d.why.push_back(effect->testable(problem.segments.front()));
+		d.screened.push_back(d.base.hypothesis.has(effect) ? Scored() : on_base.score(effect));
+	}
+	d.wrong = map(d.base);
+	select();
+	exchange();
+	prune();
+	find_rivals();
+	adequacy();
+	staleness();
+	d.verdict = verdict();
+	return d;
+}
+
+} // namespace
+
+Decision decide(const Evidence &evidence)
+{
+	return Decider(evidence).run();
+}
+
+} // namespace tactus::explain

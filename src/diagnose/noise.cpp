@@ -1,0 +1,269 @@
+/* Restricted maximum likelihood of the first autoregressive coefficient, Levinson's recursion for the others. */
+#include "diagnose/noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tactus::explain
+{
+
+namespace
+{
+
+/* The most telling columns of one output, of length 1, with the residual last; their own part only. */
+MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residual, const MatrixXd &columns)
+{
+	std::vector<std::pair<Index, Index>> pieces;
+	Index n = 0;
+	for (const Run &run : problem.runs)
+		if (run.output == output) {
+			pieces.emplace_back(run.first, run.count);
+			n += run.count;
+		}
+	auto gather = [&](const auto &from) {
+		VectorXd to(n);
+		Index at = 0;
+		for (const auto &[first, count] : pieces) {
+			to.segment(at, count) = from.segment(first, count);
+			at += count;
+		}
+		return to;
+	};
+	const VectorXd r = gather(residual);
+	std::vector<VectorXd> kept;
+	std::vector<std::pair<double, size_t>> order;
+	for (Index j = 0; j < columns.cols(); j++) {
+		VectorXd c = gather(columns.col(j));
+		const double size = c.norm();
+		if (!(size > 0) || !c.allFinite())
+			continue;
+		kept.push_back(c / size);
+		order.emplace_back(-std::abs(kept.back().dot(r)), kept.size() - 1);
+	}
+	std::sort(order.begin(), order.end());
+	const size_t most = std::min<size_t>(order.size(), size_t(n / 5));
+	MatrixXd z(n, Index(most) + 1);
+	for (size_t j = 0; j < most; j++)
+		z.col(Index(j)) = kept[order[j].second];
+	z.col(Index(most)) = r;
+	return z;
+}
+
+/* Orthonormal columns for those that are independent; the last column stays last. */
+MatrixXd independent(const MatrixXd &z)
+{
+	const Index q = z.cols() - 1;
+	if (q == 0)
+		return z;
+	const MatrixXd gram = z.leftCols(q).transpose() * z.leftCols(q);
+	const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
+	std::vector<Index> kept;
+	for (Index j = 0; j < q; j++)
+		if (eigen.eigenvalues()[j] > 1e-7 * eigen.eigenvalues()[q - 1])
+			kept.push_back(j);
+	MatrixXd turn(q, Index(kept.size()));
+	for (size_t j = 0; j < kept.size(); j++)
+		turn.col(Index(j)) = eigen.eigenvectors().col(kept[j]) / std::sqrt(eigen.eigenvalues()[kept[j]]);
+	MatrixXd result(z.rows(), turn.cols() + 1);
+	result.leftCols(turn.cols()).noalias() = z.leftCols(q) * turn;
+	result.rightCols(1) = z.rightCols(1);
+	return result;
+}
+
+/* Sums of products of the rows with themselves, with the row before, of the rows before; and of the first rows. */
+struct Products {
+	MatrixXd now, before, cross, first;
+	Index n = 0, runs = 0;
+};
+
+Products products_of(const Problem &problem, size_t output, const MatrixXd &z)
+{
+	const Index q = z.cols();
+	Products p{MatrixXd::Zero(q, q), MatrixXd::Zero(q, q), MatrixXd::Zero(q, q), MatrixXd::Zero(q, q), z.rows(), 0};
+	p.now.noalias() = z.transpose() * z;
+	p.before = p.now;
+	Index at = 0;
+	for (const Run &run : problem.runs) {
+		if (run.output != output)
+			continue;
+		const auto piece = z.middleRows(at, run.count);
+		p.cross.noalias() += piece.bottomRows(run.count - 1).transpose() * piece.topRows(run.count - 1);
+		p.first += piece.row(0).transpose() * piece.row(0);
+		p.before -= piece.row(run.count - 1).transpose() * piece.row(run.count - 1);
+		at += run.count;
+		p.runs++;
+	}
+	p.now -= p.first; /* rows that have one before them */
+	return p;
+}
+
+/* −2 × restricted log likelihood of an AR(1) process, and what the regression then gives. */
+double restricted(const Products &p, double phi, double *square, VectorXd *coefficients)
+{
+	MatrixXd g = p.now - phi * (p.cross + p.cross.transpose()) + phi * phi * p.before + (1 - phi * phi) * p.first;
+	const Index q = g.cols() - 1;
+	const Eigen::LLT<MatrixXd> factor(g.topLeftCorner(q, q) + 1e-12 * MatrixXd::Identity(q, q));
+	const VectorXd b = factor.solve(g.topRightCorner(q, 1));
+	*square = std::fmax(g(q, q) - g.topRightCorner(q, 1).col(0).dot(b), 1e-300);
+	if (coefficients)
+		*coefficients = b;
+	double logs = -double(p.runs) * std::log(1 - phi * phi);
+	for (Index j = 0; j < q; j++)
+		logs += 2 * std::log(factor.matrixLLT()(j, j));
+	return logs + double(p.n - q) * std::log(*square);
+}
+
+double best_phi(const Products &p)
+{
+	double best = 0, least = INFINITY, square;
+	for (double u = -1.0; u <= 3.8; u += 0.2) { /* φ = tanh u up to 0.999 */
+		const double cost = restricted(p, std::tanh(u), &square, nullptr);
+		if (cost < least) {
+			least = cost;
+			best = u;
+		}
+	}
+	for (double step = 0.1; step > 2e-3; step /= 2)
+		for (const double u : {best - step, best + step}) {
+			const double cost = restricted(p, std::tanh(u), &square, nullptr);
+			if (cost < least) {
+				least = cost;
+				best = u;
+			}
+		}
+	return std::tanh(best);
+}
+
+/* Autoregressive coefficients of u by Levinson's recursion, of the order that Schwarz's criterion asks for. */
+std::vector<double> further(const VectorXd &u, Index most)
+{
+	const Index n = u.size();
+	std::vector<double> r;
+	for (Index lag = 0; lag <= most; lag++)
+		r.push_back(u.head(n - lag).dot(u.tail(n - lag)) / double(n));
+	std::vector<double> a, best;
+	double error = r[0], least = double(n) * std::log(error) - 10;
+	for (Index order = 1; order <= most && error > 0; order++) {
+		double k = r[size_t(order)];
+		for (size_t j = 0; j < a.size(); j++)
+			k -= a[j] * r[size_t(order) - 1 - j];
+		k /= error;
+		std::vector<double> next = a;
+		for (size_t j = 0; j < a.size(); j++)
+			next[j] -= k * a[a.size() - 1 - j];
+		next.push_back(k);
+		a = next;
+		error *= 1 - k * k;
+		const double cost = double(n) * std::log(error) + 1.5 * double(order) * std::log(double(n));
+		if (cost < least) {
+			least = cost;
+			best = a;
+		}
+	}
+	return best;
+}
+
+/* (1 − φB)(1 − Σ b B^k) as one filter. */
+std::vector<double> product_filter(double phi, const std::vector<double> &b)
+{
+	std::vector<double> a(b.size() + 1, 0);
+	a[0] = phi;
+	for (size_t k = 0; k < b.size(); k++) {
+		a[k] += b[k];
+		a[k + 1] -= phi * b[k];
+	}
+	return a;
+}
+
+/* Standard deviation of the process per standard deviation of its innovations. */
+double spread_of(const std::vector<double> &a)
+{
+	std::vector<double> response{1};
+	double sum = 1;
+	for (size_t t = 1; t < 4000; t++) {
+		double value = 0;
+		for (size_t k = 0; k < a.size() && k < t; k++)
+			value += a[k] * response[t - 1 - k];
+		response.push_back(value);
+		sum += value * value;
+	}
+	return std::sqrt(sum);
+}
+
+} // namespace
+
+Noise estimate_noise(const Problem &problem, const VectorXd &y, const MatrixXd &columns, VectorXd &left)
+{
+	Noise noise;
+	VectorXd residual = problem.measured - y;
+	MatrixXd x = columns;
+	for (Index i = 0; i < residual.size(); i++)
+		if (problem.excluded[size_t(i)]) { /* as if it were predicted: of no weight in the sums */
+			residual[i] = 0;
+			x.row(i).setZero();
+		}
+	left = residual;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		if (!problem.outputs[o])
+			continue;
+		const MatrixXd z = independent(stack_of(problem, o, residual, x));
+		const Products p = products_of(problem, o, z);
+		double phi = p.n > 30 ? best_phi(p) : 0;
+		if (std::abs(phi) < 2.5 / std::sqrt(double(p.n))) /* not to be told from white noise */
+			phi = 0;
+		double square;
+		VectorXd b;
+		restricted(p, phi, &square, &b);
+		const VectorXd e = z.rightCols(1) - z.leftCols(b.size()) * b;
+		VectorXd u = e;
+		u.tail(u.size() - 1) -= phi * e.head(e.size() - 1);
+		const std::vector<double> rest = p.n > 200 ? further(u, std::min<Index>(12, p.n / 40)) : std::vector<double>();
+		if (phi != 0 || !rest.empty())
+			noise.a[o] = product_filter(phi, rest);
+		VectorXd w = u;
+		for (Index i = 0; i < u.size(); i++)
+			for (size_t k = 0; k < rest.size() && Index(k) < i; k++)
+				w[i] -= rest[k] * u[i - 1 - Index(k)];
+		noise.sigma[o] = std::sqrt(std::fmax(w.squaredNorm() / double(std::max<Index>(p.n - b.size(), 1)), 1e-30));
+		noise.spread[o] = noise.sigma[o] * spread_of(noise.a[o]);
+		Index at = 0;
+		for (const Run &run : problem.runs)
+			if (run.output == o) {
+				left.segment(run.first, run.count) = e.segment(at, run.count);
+				at += run.count;
+			}
+	}
+	return noise;
+}
+
+std::vector<size_t> find_outliers(Problem &problem, const VectorXd &left)
+{
+	std::vector<size_t> found;
+	const size_t input = problem.input_signal();
+	for (const Run &run : problem.runs) {
+		std::vector<double> size;
+		for (Index i = 0; i < run.count; i++)
+			size.push_back(std::abs(left[run.first + i]));
+		std::vector<double> sorted = size;
+		std::nth_element(sorted.begin(), sorted.begin() + long(sorted.size() / 2), sorted.end());
+		const double sigma = 1.4826 * sorted[sorted.size() / 2];
+		const double *x = problem.segments[run.segment]->signal[input];
+		std::vector<Index> wild;
+		for (Index i = 1; i + 1 < run.count; i++) {
+			const size_t at = problem.sample[size_t(run.first + i)];
+			const bool moves = x && at > 0 && std::abs(x[at] - x[at - 1]) > 0.02 * problem.input_range;
+			if (size[size_t(i)] > 8 * sigma && size[size_t(i - 1)] < 5 * sigma && size[size_t(i + 1)] < 5 * sigma &&
+				!moves)
+				wild.push_back(i);
+		}
+		if (wild.size() > size_t(run.count) / 50)
+			continue; /* not isolated: something to explain */
+		for (const Index i : wild) {
+			problem.excluded[size_t(run.first + i)] = 1;
+			found.push_back(size_t(run.first + i));
+		}
+	}
+	return found;
+}
+
+} // namespace tactus::explain

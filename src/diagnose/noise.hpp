@@ -1,0 +1,23 @@
+/* The noise of a recording: what is left when everything that could be a cause has been taken out. */
+#ifndef TACTUS_DIAGNOSE_NOISE_HPP
+#define TACTUS_DIAGNOSE_NOISE_HPP
+
+#include "diagnose/problem.hpp"
+
+namespace tactus::explain
+{
+
+/*
+ * Autoregressive noise of every output, from the residual of a saturated fit: `columns` span the base, the candidates
+ * and smooth functions of all covariates. The first coefficient maximises the restricted likelihood (Patterson &
+ * Thompson 1971), which does not mistake for signal what so many columns take out of slow noise; further ones are
+ * Yule–Walker's of what it leaves. left receives the residual of that fit, scaled, at the rows.
+ */
+Noise estimate_noise(const Problem &problem, const VectorXd &y, const MatrixXd &columns, VectorXd &left);
+
+/* Isolated wild readings: far off while their neighbours in time are not and the input rests. Sets problem.excluded. */
+std::vector<size_t> find_outliers(Problem &problem, const VectorXd &left);
+
+} // namespace tactus::explain
+
+#endif

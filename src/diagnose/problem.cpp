@@ -1,0 +1,294 @@
+/* Readings, hypotheses and what a chain says of them: rows, blocks, simulation, whitening. */
+#include "diagnose/problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "core/core.h"
+
+namespace tactus::explain
+{
+
+/* ---- hypotheses ---- */
+
+namespace
+{
+
+size_t rank_of(const tactus_domain *domain, const tactus_effect *effect)
+{
+	size_t i = 0;
+	while (domain->effects[i] && domain->effects[i] != effect)
+		i++;
+	return i;
+}
+
+size_t output_signal(const tactus_domain *domain, size_t output)
+{
+	for (size_t s = 0; s < domain->signal_count; s++)
+		if (domain->signals[s].role == TACTUS_ROLE_OUTPUT && output-- == 0)
+			return s;
+	return SIZE_MAX;
+}
+
+struct ChainFree {
+	void operator()(tactus_chain *chain) const
+	{
+		tactus_chain_free(chain);
+	}
+};
+
+} // namespace
+
+bool Hypothesis::has(const tactus_effect *effect) const
+{
+	return std::any_of(parts.begin(), parts.end(), [&](const Part &p) { return p.effect == effect; });
+}
+
+void Hypothesis::add(const tactus_domain *domain, const Part &part)
+{
+	auto before = [&](const Part &a, const Part &b) {
+		return a.effect->stage != b.effect->stage ? a.effect->stage < b.effect->stage
+												  : rank_of(domain, a.effect) < rank_of(domain, b.effect);
+	};
+	parts.insert(std::upper_bound(parts.begin(), parts.end(), part, before), part);
+}
+
+void Hypothesis::remove(const tactus_effect *effect)
+{
+	parts.erase(std::remove_if(parts.begin(), parts.end(), [&](const Part &p) { return p.effect == effect; }),
+				parts.end());
+}
+
+/* ---- rows ---- */
+
+Problem::Problem(std::vector<const tactus_series *> s, const std::vector<std::vector<std::vector<char>>> &use)
+	: domain(s.front()->domain), segments(std::move(s))
+{
+	std::vector<double> values;
+	const size_t input = input_signal();
+	double low = INFINITY, high = -INFINITY;
+	for (const tactus_series *series : segments) {
+		low = std::fmin(low, tactus_series_minimum(series, int(input)));
+		high = std::fmax(high, tactus_series_maximum(series, int(input)));
+	}
+	input_range = high > low ? high - low : 0;
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX && output_signal(domain, o) != SIZE_MAX; o++) {
+		output_count = o + 1;
+		const size_t at = values.size();
+		for (size_t k = 0; k < segments.size(); k++) {
+			const double *y = segments[k]->signal[output_signal(domain, o)];
+			Run run{o, k, Index(values.size()), 0};
+			for (size_t i = 0; y && i < segments[k]->n; i++)
+				if (use[k][o][i]) {
+					values.push_back(y[i]);
+					sample.push_back(i);
+				}
+			run.count = Index(values.size()) - run.first;
+			if (run.count > 0)
+				runs.push_back(run);
+		}
+		const size_t n = values.size() - at;
+		if (n < 2)
+			continue;
+		const Eigen::Map<VectorXd> y(values.data() + at, Index(n));
+		range[o] = y.maxCoeff() - y.minCoeff();
+		scale[o] = std::sqrt((y.array() - y.mean()).square().mean());
+		outputs[o] = scale[o] > 0 && std::isfinite(scale[o]);
+		if (!outputs[o]) { /* never changes: it says nothing */
+			values.resize(at);
+			sample.resize(at);
+			runs.erase(std::remove_if(runs.begin(), runs.end(), [&](const Run &r) { return r.output == o; }),
+					   runs.end());
+			continue;
+		}
+		for (size_t i = at; i < values.size(); i++)
+			values[i] /= scale[o];
+	}
+	measured = Eigen::Map<VectorXd>(values.data(), Index(values.size()));
+	excluded.assign(values.size(), 0);
+	block.assign(values.size(), 0);
+}
+
+size_t Problem::input_signal() const
+{
+	for (size_t s = 0; s < domain->signal_count; s++)
+		if (domain->signals[s].role == TACTUS_ROLE_INPUT)
+			return s;
+	return 0;
+}
+
+/*
+ * Blocks are stretches of samples, 32 where there are enough, shared by the outputs; every fourth is held out. Three
+ * recordings or more: the last third of them is held out whole. A few rows at either end of a held-out block are left
+ * out, so that neighbours in time do not tell of each other.
+ */
+void Problem::make_blocks()
+{
+	const size_t count = segments.size();
+	size_t longest = 0;
+	for (const Run &run : runs)
+		longest = std::max(longest, size_t(run.count));
+	whole_recordings = count >= 3;
+	const int wanted = std::max(4, 32 / int(count));
+	const int per = int(std::clamp<size_t>(longest / 12, 1, size_t(wanted)));
+	block_count = per * int(count);
+	test.assign(size_t(block_count), 0);
+	fold.assign(size_t(block_count), 0);
+	int training_blocks = 0;
+	for (int b = 0; b < block_count; b++) {
+		test[size_t(b)] = whole_recordings ? size_t(b / per) * 3 >= count * 2 : b % 4 == 2;
+		fold[size_t(b)] = char(training_blocks++ % 8);
+	}
+	auto block_at = [&](const Run &run, Index i) {
+		const double share = double(sample[size_t(run.first + i)]) / double(segments[run.segment]->n);
+		return int(run.segment) * per + std::min(per - 1, int(share * per));
+	};
+	for (const Run &run : runs) {
+		const Index gap = std::clamp<Index>(run.count / (per * 20), 1, 20);
+		for (Index i = 0; i < run.count; i++) {
+			const int here = block_at(run, i), before = block_at(run, std::max<Index>(i - gap, 0)),
+					  after = block_at(run, std::min<Index>(i + gap, run.count - 1));
+			const bool apart = test[size_t(before)] != test[size_t(here)] || test[size_t(after)] != test[size_t(here)];
+			block[size_t(run.first + i)] = apart && per > 1 ? -1 : here;
+		}
+	}
+	count_training();
+}
+
+void Problem::count_training()
+{
+	training = 0;
+	for (Index i = 0; i < rows(); i++)
+		training += trains(i, Rows::train);
+}
+
+bool Problem::trains(Index row, Rows which) const
+{
+	const int b = block[size_t(row)];
+	return !excluded[size_t(row)] && (which == Rows::all || (b >= 0 && !test[size_t(b)]));
+}
+
+VectorXd Problem::at_rows(size_t signal) const
+{
+	VectorXd x = VectorXd::Constant(rows(), NAN);
+	for (const Run &run : runs)
+		if (const double *from = segments[run.segment]->signal[signal])
+			for (Index i = run.first; i < run.first + run.count; i++)
+				x[i] = from[sample[size_t(i)]];
+	return x;
+}
+
+/* ---- simulation ---- */
+
+bool Problem::simulate(const Hypothesis &h, VectorXd &y) const
+{
+	std::vector<const tactus_effect *> effects;
+	std::vector<const double *> parameters;
+	for (const Part &part : h.parts) {
+		effects.push_back(part.effect);
+		parameters.push_back(part.value.data());
+	}
+	tactus_chain *made = nullptr;
+	if (tactus_chain_new(domain, h.base.data(), effects.data(), parameters.data(), effects.size(), &made) != TACTUS_OK)
+		return false;
+	const std::unique_ptr<tactus_chain, ChainFree> chain(made);
+	y.resize(rows());
+	std::vector<double> buffer;
+	for (size_t k = 0; k < segments.size(); k++) {
+		const size_t n = segments[k]->n;
+		buffer.resize(n * output_count);
+		double *signal[TACTUS_SIGNALS_MAX];
+		std::copy_n(segments[k]->signal, TACTUS_SIGNALS_MAX, signal);
+		for (size_t o = 0; o < output_count; o++)
+			signal[output_signal(domain, o)] = outputs[o] ? buffer.data() + o * n : nullptr;
+		tactus_chain_reset(chain.get());
+		if (tactus_chain_run(chain.get(), n, signal) != TACTUS_OK)
+			return false;
+		for (const Run &run : runs)
+			for (Index i = run.first; run.segment == k && i < run.first + run.count; i++)
+				y[i] = buffer[run.output * n + sample[size_t(i)]] / scale[run.output];
+	}
+	return y.allFinite();
+}
+
+VectorXd Problem::whiten(const VectorXd &x) const
+{
+	VectorXd w(x.size());
+	for (const Run &run : runs) {
+		const std::vector<double> &a = noise.a[run.output];
+		const double inverse = 1 / noise.sigma[run.output];
+		const auto p = Index(a.size());
+		for (Index i = 0; i < run.count; i++) {
+			const Index row = run.first + i;
+			double value = x[row];
+			for (Index k = 0; k < p && k < i; k++)
+				value -= a[size_t(k)] * x[row - 1 - k];
+			w[row] = i < p ? 0 : value * inverse;
+		}
+	}
+	return w;
+}
+
+void Problem::mask(Eigen::Ref<VectorXd> w, Rows which) const
+{
+	for (Index i = 0; i < w.size(); i++)
+		if (!trains(i, which))
+			w[i] = 0;
+}
+
+/* ---- parameters ---- */
+
+double Problem::ranged(const tactus_parameter &info, double value) const
+{
+	const std::string unit = info.unit;
+	auto of = [&](const std::string &word) {
+		if (word == "N" && input_range > 0)
+			return input_range;
+		for (size_t o = 0; o < output_count; o++)
+			if (word == "output" + std::to_string(o) && range[o] > 0)
+				return range[o];
+		return 1.0;
+	};
+	const size_t slash = unit.find('/');
+	return value * of(unit.substr(0, slash)) / (slash == std::string::npos ? 1 : of(unit.substr(slash + 1)));
+}
+
+bool Problem::acts(const tactus_parameter &info) const
+{
+	return info.kind != TACTUS_CONSTANT && (info.output < 0 || outputs[info.output]);
+}
+
+Part Problem::neutral(const tactus_effect *effect) const
+{
+	Part part;
+	part.effect = effect;
+	for (size_t i = 0; i < effect->parameter_count; i++) {
+		const tactus_parameter &info = effect->parameters[i];
+		const double stated =
+			info.kind == TACTUS_CONSTANT || info.kind == TACTUS_SHAPE ? ranged(info, info.start) : info.neutral;
+		part.value.push_back(std::fmin(std::fmax(stated, info.lower), info.upper));
+	}
+	return part;
+}
+
+std::vector<Slot> Problem::slots(const Hypothesis &h) const
+{
+	std::vector<Slot> result;
+	for (size_t i : h.base_free)
+		result.push_back({-1, i, &domain->base[i], ranged(domain->base[i], domain->base[i].scale)});
+	for (size_t k = 0; k < h.parts.size(); k++)
+		for (size_t i : h.parts[k].free) {
+			const tactus_parameter &info = h.parts[k].effect->parameters[i];
+			result.push_back({long(k), i, &info, ranged(info, info.scale)});
+		}
+	return result;
+}
+
+double &Problem::value(Hypothesis &h, const Slot &slot)
+{
+	return slot.part < 0 ? h.base[slot.index] : h.parts[size_t(slot.part)].value[slot.index];
+}
+
+} // namespace tactus::explain

@@ -1,0 +1,167 @@
+/* Sentences: where a residual depends on what, and by how much. */
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+#include "diagnose/report.hpp"
+
+namespace tactus::explain
+{
+
+Store::~Store()
+{
+	tactus_model_free(extended);
+}
+
+const char *Store::text(const std::string &s)
+{
+	texts.push_back(s);
+	return texts.back().c_str();
+}
+
+const char *Store::format(const char *format, ...)
+{
+	char buffer[1024];
+	va_list arguments;
+	va_start(arguments, format);
+	vsnprintf(buffer, sizeof buffer, format, arguments);
+	va_end(arguments);
+	return text(buffer);
+}
+
+std::string unit_of(const Work &work, const char *unit)
+{
+	const std::string text = unit;
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
+		const std::string word = "output" + std::to_string(o);
+		if (text.compare(0, word.size(), word) == 0)
+			return work.output_unit[o] + text.substr(word.size());
+	}
+	return text;
+}
+
+std::string quantity(double value, const std::string &unit)
+{
+	static const char *const prefixes[] = {"f", "p", "n", "u", "m", "", "k", "M", "G"};
+	char text[64];
+	const double size = std::abs(value);
+	int power = size > 0 && std::isfinite(size) ? int(std::floor(std::log10(size) / 3)) : 0;
+	static const char *const plain[] = {"", "1", "degC", "pct", "um", "mm", "mV"};
+	const bool bare = std::any_of(std::begin(plain), std::end(plain), [&](const char *p) { return unit == p; }) ||
+					  unit.find('/') != std::string::npos;
+	if (bare || power < -5 || power > 3 || unit.size() > 4)
+		snprintf(text, sizeof text, "%.3g%s%s", value, unit.empty() || unit == "1" ? "" : " ",
+				 unit == "1" ? "" : unit.c_str());
+	else
+		snprintf(text, sizeof text, "%.3g %s%s", value / std::pow(10, 3 * power), prefixes[power + 5], unit.c_str());
+	return text;
+}
+
+namespace
+{
+
+struct Bins {
+	std::vector<double> at, mean;
+};
+
+/* Means of the residual of one output in parts of the covariate that hold equally many rows. */
+Bins bins_of(const Problem &problem, size_t output, const VectorXd &values, const VectorXd &residual)
+{
+	std::vector<std::pair<double, double>> pairs;
+	for (const Run &run : problem.runs)
+		for (Index i = run.first; run.output == output && i < run.first + run.count; i++)
+			if (std::isfinite(values[i]) && !problem.excluded[size_t(i)])
+				pairs.emplace_back(values[i], residual[i]);
+	std::sort(pairs.begin(), pairs.end());
+	Bins bins;
+	const size_t count = std::min<size_t>(8, pairs.size());
+	for (size_t k = 0; k < count; k++) {
+		const size_t from = k * pairs.size() / count, to = (k + 1) * pairs.size() / count;
+		double x = 0, r = 0;
+		for (size_t i = from; i < to; i++) {
+			x += pairs[i].first;
+			r += pairs[i].second;
+		}
+		bins.at.push_back(x / double(to - from));
+		bins.mean.push_back(r / double(to - from));
+	}
+	return bins;
+}
+
+std::string shape_of(const Bins &bins)
+{
+	const auto [low, high] = std::minmax_element(bins.mean.begin(), bins.mean.end());
+	const auto l = size_t(low - bins.mean.begin()), h = size_t(high - bins.mean.begin()), n = bins.mean.size();
+	const double span = *high - *low, ends = bins.mean.back() - bins.mean.front();
+	if (std::abs(ends) > 0.8 * span)
+		return ends > 0 ? "rises with" : "falls with";
+	if ((h > 0 && h + 1 < n) != (l > 0 && l + 1 < n))
+		return h > 0 && h + 1 < n ? "is highest in the middle of" : "is lowest in the middle of";
+	return "changes with";
+}
+
+std::string unit_in_name(const std::string &column)
+{
+	const size_t at = column.rfind('_');
+	return at == std::string::npos ? "" : column.substr(at + 1);
+}
+
+} // namespace
+
+const tactus_dependence *describe(Store &store, const Work &work, const std::vector<Dependence> &list, const Fit &fit)
+{
+	const Problem &problem = *work.problem;
+	VectorXd y;
+	problem.simulate(fit.hypothesis, y);
+	const VectorXd residual = problem.measured - y;
+	std::vector<tactus_dependence> result;
+	for (const Dependence &dep : list) {
+		const Group &group = *dep.group;
+		const std::string &name = group.covariate;
+		size_t output = 0;
+		double widest = -1;
+		Bins shown;
+		for (size_t o = 0; o < problem.output_count; o++) {
+			if (!problem.outputs[o])
+				continue;
+			const Bins bins = bins_of(problem, o, group.values, residual);
+			if (bins.mean.empty())
+				continue;
+			const auto [low, high] = std::minmax_element(bins.mean.begin(), bins.mean.end());
+			if (*high - *low > widest) {
+				widest = *high - *low;
+				output = o;
+				shown = bins;
+			}
+		}
+		std::string text;
+		const std::string what = work.output_name[output];
+		if (group.aspect == "history")
+			text = what + " depends on what " + name + " was before, not only on what it is";
+		else if (group.aspect == "direction")
+			text = what + " differs between rising and falling " + name;
+		else if (group.aspect == "sensitivity")
+			text = "the sensitivity of " + what + " changes with " + name;
+		else if (!shown.mean.empty()) {
+			const auto [low, high] = std::minmax_element(shown.mean.begin(), shown.mean.end());
+			const std::string unit = work.output_unit[output];
+			const double scale = problem.scale[output];
+			const double at_low = shown.at[size_t(low - shown.mean.begin())],
+						 at_high = shown.at[size_t(high - shown.mean.begin())];
+			text = "the residual of " + what + " " + shape_of(shown) + " " + name + ": " +
+				   quantity(*low * scale, unit) + " around " + quantity(at_low, unit_in_name(name)) + ", " +
+				   quantity(*high * scale, unit) + " around " + quantity(at_high, unit_in_name(name));
+		} else {
+			text = what + " depends on " + name;
+		}
+		if (group.unknown)
+			text += " (a column that no cause of the catalogue knows)";
+		else if (problem.segments.size() > 1 && name == "time_s")
+			text += ", at the same times in every recording: an unrecorded cause";
+		result.push_back({store.text(name), dep.explained, dep.p_value, store.text(text)});
+	}
+	return store.keep(std::move(result));
+}
+
+} // namespace tactus::explain
