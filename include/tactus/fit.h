@@ -96,10 +96,12 @@ TACTUS_API const tactus_model *tactus_fit_model(const tactus_fit_result *result)
 enum { TACTUS_NETWORK_WEIGHTS = 9, TACTUS_NETWORK_PARAMETERS = 15 };
 
 /**
- * Fits a 2-2-1 network to n points from each of start_count × 9 starting weights (of readings and force standardised to
- * mean 0 and variance 1) and keeps the best: parameters[15] as a model file names them. costs[start_count] (or NULL)
- * receives ½ Σ residual² of the standardised force per start, INFINITY where it failed. TACTUS_ERR_DATA if a reading
- * never changes or is not finite, TACTUS_ERR_CONVERGENCE if no start converged.
+ * Fits a 2-2-1 network to n points (readings and force standardised to mean 0 and variance 1) by a search that begins
+ * at start_count × 9 starting weights, goes on with their hidden units in other company, polishes the best and keeps
+ * one: parameters[15] as a model file names them. Of more than 128 points the search sees that many, the polishing all.
+ * costs[start_count] (or NULL) receives the least ½ Σ residual² of the standardised force, over all points, that was
+ * reached from each start, INFINITY where none was; the least of them is that of the parameters. TACTUS_ERR_DATA if a
+ * reading never changes or is not finite, TACTUS_ERR_CONVERGENCE if no start converged.
  */
 TACTUS_API int tactus_fit_network(size_t n, const double *conductance_S, const double *capacitance_F,
 								  const double *force_N, const double *starts, size_t start_count, double *parameters,

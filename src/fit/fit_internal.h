@@ -75,8 +75,6 @@ int tactus_regress_force(size_t n, const double *conductance_S, const double *ca
 						 double *parameters, double *std, double *residual_std_N);
 /* Starting weights of the network, drawn from (seed, stream): starts × TACTUS_NETWORK_WEIGHTS. */
 void tactus_network_starts(uint64_t seed, uint64_t stream, size_t starts, double *weights);
-/* Standardised network: residual and (unless NULL) its gradient to the nine weights, at one point. */
-double tactus_network_residual(const double *weights, double u, double v, double target, double *gradient);
 void tactus_silence_glog(void);
 
 /* ---- figures ---- */
