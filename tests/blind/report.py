@@ -13,7 +13,7 @@ def percent(x):
 
 
 def figure_lines(scored, only=None):
-    lines = ["| figure | right | share, % | 95 % interval, % | target | |", "| --- | --- | --- | --- | --- | --- |"]
+    lines = ["| figure | count | share, % | 95 % interval, % | target | |", "| --- | --- | --- | --- | --- | --- |"]
     table = score.figures(scored)
     for figure, (text, _, _) in score.TARGETS.items():
         if figure not in table or only and not figure.startswith(only):
@@ -86,8 +86,7 @@ def time_line(scored):
 
 
 PREFACE = """Made by `make blind`: recordings that hide effects, generated with other mathematics than the catalogue's
-(`tests/blind`), answers kept apart and read by the scorer alone. Seeds from {seeds}; none of them was looked at while
-the diagnosis was made."""
+(`tests/blind`), answers kept apart and read by the scorer alone. Seeds: {seeds}."""
 
 EXPLANATION = """Shares are of the whitened residual variance after the base was refitted, known exactly: the generator
 has signal and noise apart. “Unique share” of one of two effects: what only it explains, of all that is left. What counts as
@@ -119,16 +118,20 @@ def markdown(scored, seeds, real=()):
     return "\n".join(f"{title}\n\n" + "\n".join(lines) + "\n" for title, lines in sections)
 
 
-def misses(scored, limit=40):
-    """Lines for the terminal: which recordings to look at."""
-    lines = []
-    for s in scored:
-        for figure, value in s.judged:
-            sense = score.TARGETS[figure][1]
-            if sense == "max" and value or sense == "min" and not value:
-                said = " + ".join(s.answer.named) or s.answer.verdict
-                if s.answer.set and not s.answer.named:
-                    said += f" {{{', '.join(sorted(s.answer.set))}}}"
-                lines.append(f"{figure:<18} {s.kind:<42} share {s.truth.get('share', 0):.2f} "
-                             f"{'/'.join(s.truth.get('forms', [])):<24} said {said:<40} {s.name}")
+def misses(scored, per_kind=1, limit=60):
+    """Lines for the terminal: which recordings to look at, one line each, a few of each kind."""
+    lines, seen = [], collections.Counter()
+    for s in sorted(scored, key=lambda x: (x.kind, x.seed)):
+        bad = [f for f, value in s.judged
+               if score.TARGETS[f][1] == "max" and value or score.TARGETS[f][1] in ("min", "between") and not value]
+        if not bad:
+            continue
+        seen[s.kind] += 1
+        if seen[s.kind] > per_kind:
+            continue
+        said = " + ".join(s.answer.named) or s.answer.verdict
+        if s.answer.set and not s.answer.named:
+            said += f" {{{', '.join(sorted(s.answer.set))}}}"
+        truth = " + ".join(s.truth.get("forms", []))
+        lines.append(f"{s.name} {s.kind:<44} {truth} share {s.truth.get('share', 0):.2f}: said {said} ({', '.join(bad)})")
     return lines[:limit]

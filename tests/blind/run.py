@@ -198,7 +198,8 @@ def main():
     scored = [s for s in score.read_folder(folder) if s.name in chosen]
     figures = score.figures(scored)
     if options.suite == "full":
-        text = report.markdown(scored, f"{base} on", real.diagnose(TACTUS) if not options.only else ())
+        note = "none of which was looked at while the diagnosis was made" if reported else "of those used for tuning"
+        text = report.markdown(scored, f"{base} on, {note}", real.diagnose(TACTUS) if not options.only else ())
         target = options.output if reported else folder / "BLIND.md"
         target.write_text(text, encoding="utf-8")
         print("\n".join(report.figure_lines(scored)))
