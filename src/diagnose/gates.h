@@ -27,8 +27,11 @@ typedef struct {
 
 /*
  * Finds the problems of one recording that was split into `count` series. use[c][o][i] (o: output, i: sample of the
- * series) is true on entry where an output has a value and is set false where the reading must not count: clipped,
- * wrong-signed, outliers are found later. TACTUS_ERR_MEMORY.
+ * series) is true on entry where an output has a value and is set false where the reading must not count: without its
+ * input or time, clipped, flagged wrong-sign (beyond the noise about zero) or missing, dead, too few. Clipped readings
+ * stay where the domain's catalogue has output-clipping, those at the lower end where it has a dead zone: they are for
+ * it to explain. Outliers are found later. Problems are of channel 0 in domains whose series are not channels.
+ * TACTUS_ERR_MEMORY.
  */
 int tactus_gates(const tactus_table *recording, const tactus_series *series, size_t count, bool *const *const *use,
 				 tactus_gate_problems *problems);

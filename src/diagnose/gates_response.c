@@ -91,9 +91,10 @@ typedef struct {
 static int covariances(const tactus_gate_view *v, double *score)
 {
 	size_t n = v->n;
-	double *a = malloc(2 * n * sizeof *a), *b = a + n, ma = 0, mb = 0;
+	double *a = malloc(2 * n * sizeof *a), ma = 0, mb = 0;
 	if (!a)
 		return TACTUS_ERR_MEMORY;
+	double *b = a + n;
 	for (size_t k = 0; k < n; k++) {
 		ma += v->x[k] / (double)n;
 		mb += v->expected[k] / (double)n;
