@@ -3,6 +3,9 @@ recording without the experiment that separates the causes, and one with it.
 
 Without: right is `ambiguous` with the truth among causes and rivals (a stale parameter whose rivals hold the truth says
 the same). With: the truth named. Each row returns (bench, hidden effect or None, its amplitude, extra truth).
+
+Where a rival resembles the truth without being the same, `rival` gives what it can do, as columns; the noise is then
+made as loud as it takes for the truth to fit no better than the best rival, by more than APART of chi-squared.
 """
 
 from dataclasses import replace
@@ -10,16 +13,18 @@ from dataclasses import replace
 import numpy as np
 
 import levels
+import noise
 from cases import finish
 from cases_stale import stale_model
 from hidden import FORMS, Hidden
-from protocols import Builder, History
+from protocols import History
 from readout_bench import Grid, ReadoutBench
-from recording import model_text
+from recording import model_text, power, without
 from sensor_bench import CYCLES, FAST, Plan, SLOW, SensorBench, plan_for
 from sensor_row import SensorRow
 
 ROWS = {}
+APART = 3.0
 
 
 def row(function):
@@ -31,40 +36,46 @@ def form(effect, name, rng, bench):
     return next(make for make in FORMS[effect] if make.__name__ == name)(rng, bench)
 
 
-def one_sine(rng, rate_Hz=None, seconds=30):
+def one_sine(rng, rate_Hz, seconds, colour=noise.any_colour):
     """One sine of one rate and amplitude around a mean, steady from the first sample on."""
     f = rng.uniform(0.4, 1.2)
     top, mean = rng.uniform(3, 6), 0.5
     t = np.arange(-3, seconds + 3, 1 / f / 400)
     history = History(t, top * (mean + 0.4 * np.sin(2 * np.pi * f * t)))
-    bench = SensorBench(rng, FAST, outputs=["conductance_S"], history=history, samples=int(seconds * 50), rate_Hz=50.0)
+    bench = SensorBench(rng, FAST, colour, ["conductance_S"], history, int(seconds * rate_Hz), rate_Hz)
     bench.top_N = top
     return bench
 
 
 def hold_forever(rng):
-    """Loaded once, slowly warmed, never unloaded."""
-    b = Builder(0.5)
+    """Loaded just before the first reading, never unloaded, with a ripple of a few per cent; the room warms."""
     top = rng.uniform(3, 7)
-    b.hold(2)
-    b.step(0.8 * top, 240)
-    bench = SensorBench(rng, replace(SLOW, temperature=True), outputs=["conductance_S"], samples=2400, rate_Hz=10.0,
-                        history=History(b.time, b.value))
+    t = np.arange(-0.2, 250, 0.2)
+    ripple = top * (0.8 + 0.06 * np.sin(2 * np.pi * t / rng.uniform(11, 19)))
+    history = History(np.r_[-0.3, t], np.r_[0, ripple])
+    bench = SensorBench(rng, replace(SLOW, temperature=True), outputs=["conductance_S"], samples=1200, rate_Hz=5.0,
+                        history=history)
     bench.top_N = top
     t = bench.time_s / bench.time_s[-1]
     bench.temperature_degC = 22 + rng.uniform(3, 6) * -np.expm1(-3 * t)
     return bench
 
 
-def cycle_only(rng, seconds, cycle_s):
-    """Cycling from no load to one amplitude, from the first second to the last."""
+def cycle_only(rng, seconds, cycle_s, valley=0.0):
+    """Cycling between `valley` (a share of the top) and the top, from the first second to the last."""
     top = rng.uniform(3, 7)
     t = np.arange(0, seconds + 3, cycle_s / 60)
-    history = History(t, top / 2 * (1 - np.cos(2 * np.pi * t / cycle_s)))
+    history = History(t, top * (valley + (1 - valley) / 2 * (1 - np.cos(2 * np.pi * t / cycle_s))))
     bench = SensorBench(rng, CYCLES, outputs=["conductance_S"], samples=int(seconds * 15), rate_Hz=15.0,
                         history=history)
     bench.top_N, bench.cycle_s = top, cycle_s
     return bench
+
+
+def preload(bench, share):
+    """The same history, squeezed so that it begins and rests at a share of its top."""
+    bench.history = History(bench.history.time_s, share * bench.top_N + (1 - share) * bench.history.value)
+    bench.fine()
 
 
 def bench_of(rng, effect):
@@ -93,17 +104,20 @@ def capacitance_slope_or_delay(rng, separated):
 
 @row
 def saturation_or_power(rng, separated):
-    """A slight bend, no load past the knee. With: five times the load of the knee."""
+    """A slight bend over a preload, nothing past the knee. With: no preload, and four times the load of the knee."""
     bench = SensorBench(rng, Plan(), outputs=["conductance_S"])
+    if not separated:
+        preload(bench, 0.35)
     made = form("saturation", "compressed_grains", rng, bench)
     made.limits, made.start = ((3, 6), (4, 5)) if separated else ((0.05, 0.3), (0.15, 0.25))
-    return bench, made, rng.uniform(*((8, 20) if separated else (1.2, 1.8))), {}
+    return bench, made, rng.uniform(*((8, 20) if separated else (1.2, 1.8))), {
+        "rival": lambda: [bench.top_N * (bench.force_N / bench.top_N) ** n for n in np.arange(0.3, 1, 0.02)]}
 
 
 @row
 def lag_or_time_offset(rng, separated):
     """One sine. With: taps, sampled ten times and more within the lag."""
-    bench = bench_of(rng, "lag") if separated else one_sine(rng)
+    bench = bench_of(rng, "lag") if separated else one_sine(rng, 50.0, 30)
     made = form("lag", "overdamped", rng, bench)
     if separated:
         made.start, made.limits = (10, 20), (8, 40)
@@ -114,10 +128,11 @@ def lag_or_time_offset(rng, separated):
 
 @row
 def hysteresis_or_lag(rng, separated):
-    """One sine: an ellipse. With: several rates and amplitudes."""
-    bench = bench_of(rng, "hysteresis") if separated else one_sine(rng)
+    """One sine: nearly an ellipse; white noise, in which its corners drown last. With: several rates and amplitudes."""
+    bench = bench_of(rng, "hysteresis") if separated else one_sine(rng, 25.0, 14, lambda r: noise.white())
     made = form("hysteresis", "stick_slip_elements", rng, bench)
-    return bench, made, rng.uniform(*((5, 15) if separated else (0.9, 1.4))), {}
+    return bench, made, rng.uniform(*((5, 15) if separated else (0.9, 1.4))), {
+        "rival": lambda: [bench.history.at(bench.time_s - bench.dt_s)]}
 
 
 @row
@@ -125,8 +140,10 @@ def creep_or_drift_or_temperature(rng, separated):
     """Loaded once and held, while the room warms. With: load, rest, load and a temperature that swings."""
     swinging = replace(SLOW, temperature=True)
     bench = SensorBench(rng, swinging, outputs=["conductance_S"]) if separated else hold_forever(rng)
-    made = form("creep", "kelvin_chain", rng, bench)
-    return bench, made, rng.uniform(*((4, 12) if separated else (2, 5))), {}
+    made = form("creep", "kelvin_chain" if separated else "power_law_creep", rng, bench)
+    t = bench.time_s / bench.duration_s
+    return bench, made, rng.uniform(*((4, 12) if separated else (2, 5))), {
+        "rival": lambda: [on * t ** n for on in (1, bench.force_N) for n in np.arange(0.1, 1, 0.02)]}
 
 
 @row
@@ -139,11 +156,10 @@ def linear_decline_or_gain_drift(rng, separated):
 
 @row
 def the_two_declines(rng, separated):
-    """A record much shorter than 1/b. With: several 1/b."""
-    bench = bench_of(rng, "cyclic-decline")
-    made = form("cyclic-decline", "work_hardening", rng, bench)
-    if not separated:
-        made = form("linear-decline", "miner_damage", rng, bench)
+    """One amplitude, a record much shorter than 1/b. With: several amplitudes, several 1/b."""
+    bench = bench_of(rng, "cyclic-decline") if separated else cycle_only(rng, 160, 2.0, rng.uniform(0.25, 0.4))
+    made = form("cyclic-decline", "work_hardening", rng, bench) if separated else \
+        form("linear-decline", "steady_wear", rng, bench)
     return bench, made, rng.uniform(*((3, 8) if separated else (1, 2))), {}
 
 
@@ -152,9 +168,7 @@ def dead_zone_or_offset(rng, separated):
     """All loads above the dead zone: against the earlier model only the offset has moved. With: low loads."""
     bench = SensorBench(rng, Plan(), outputs=["conductance_S"])
     if not separated:
-        top = bench.top_N
-        bench.history = History(bench.history.time_s, 0.4 * top + 0.6 * bench.history.value)
-        bench.fine()
+        preload(bench, 0.4)
     made = form("dead-zone", "closing_gaps", rng, bench)
     made.start, made.limits = (0.1, 0.2), (0.05, 0.24)
     return bench, made, rng.uniform(4, 12), {"earlier": not separated}
@@ -219,6 +233,14 @@ def in_proportion_to_frequency(rng, separated):
     return bench, made, rng.uniform(*((4, 12) if separated else (1, 2))), {}
 
 
+def better_than_rivals(bench, made, strength, sigma, columns):
+    """Chi-squared by which the truth fits better than the best of the columns, each beside the base."""
+    (name, output), = bench.series(sigma)[1].items()
+    effect = output.white(bench.clean({made.effect: strength})[name] - bench.clean({})[name])
+    base = output.white(output.base)
+    return min(power(without(np.column_stack([base, output.white(c)]), effect)) for c in columns)
+
+
 def level(bench, rng, made, wanted, absorbed):
     """As levels.set_level; where the base absorbs all of the effect, its plain rms counts."""
     if not absorbed:
@@ -233,6 +255,7 @@ def level(bench, rng, made, wanted, absorbed):
 
 def ambiguous(name, separated, rng, seed):
     bench, made, wanted, extra = ROWS[name](rng, separated)
+    rival = extra.pop("rival", None)
     truth = {"row": name, "separated": separated, **extra}
     if made is None:
         sigma = float(np.exp(rng.uniform(*np.log(bench.noise_limits))))
@@ -244,6 +267,9 @@ def ambiguous(name, separated, rng, seed):
         bench.hide(made)
     earlier = bool(extra.get("earlier"))  # the model of the day before: what has happened since, the base can absorb
     strength, sigma = level(bench, rng, made, wanted, absorbed=earlier)
+    if rival and not separated:
+        left = better_than_rivals(bench, made, strength, sigma, rival())
+        sigma *= max(1.0, np.sqrt(left / APART))
     values, by_channel = levels.true_shares(bench, {made.effect: strength}, sigma)
     truth.update(effects=[made.effect], strength=strength, sigma=sigma,
                  share=max(s[made.effect]["share"] for s in by_channel.values()))
