@@ -17,7 +17,7 @@ double paired(const Problem &problem, const std::vector<double> &a, const std::v
 	for (size_t k = 0; k < a.size(); k++) {
 		if (problem.test[k] || (a[k] == 0 && b[k] == 0))
 			continue;
-		const double d = a[k] - b[k];
+		const double d = std::log((a[k] + 1) / (b[k] + 1)); /* no single block decides */
 		sum += d;
 		square += d * d;
 		n++;
@@ -103,6 +103,16 @@ Fit join(const Problem &problem, const Fit &fit, const Part &part)
 		best = grown;
 	}
 	return best;
+}
+
+/*
+ * No form of the catalogue is exact: what a parameter buys must be worth a share of all that the effect explains, or a
+ * flexible wrong cause (a staircase of steps) would beat a plain right one (a trend).
+ */
+double merit(const Fit &with, const Fit &without)
+{
+	return (with.cost - without.cost) *
+		   std::fmax(1 - limits.parameter_share * (with.parameters - without.parameters), 0.1);
 }
 
 namespace
@@ -251,7 +261,11 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 			break;
 		tried++;
 		const Fit joined = join(problem, fit, s.part);
-		if (joined.ok && (!best.ok || joined.cost < best.cost)) {
+#ifdef EXPLAIN_TRACE
+		fprintf(stderr, "  try %s linear %.1f joint %.1f ok %d\n", s.part.effect->name, s.cost,
+				joined.ok ? joined.cost - fit.cost : NAN, joined.ok);
+#endif
+		if (joined.ok && (!best.ok || merit(joined, fit) < merit(best, fit))) {
 			best = joined;
 			*effect = s.part.effect;
 		}
@@ -262,6 +276,12 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 bool Decider::stands(const Fit &with, const Fit &without, double removed) const
 {
 	const double gain = without.square - with.square;
+#ifdef EXPLAIN_TRACE
+	fprintf(stderr, "  stands? ok %d evidence %.1f share %.3f further %.3f paired %.2f (n %ld square %.0f -> %.0f)\n",
+			with.ok, without.cost - with.cost, gain / without.square, gain / (removed + gain),
+			with.ok ? paired(problem, problem.held_out(without), problem.held_out(with)) : 0, long(problem.training),
+			without.square, with.square);
+#endif
 	return with.ok && without.cost - with.cost > limits.evidence && gain > limits.share * without.square &&
 		   gain > limits.further_share * (removed + gain) &&
 		   paired(problem, problem.held_out(without), problem.held_out(with)) > limits.paired;
@@ -313,7 +333,7 @@ void Decider::exchange()
 			continue;
 		const tactus_effect *effect;
 		const Fit other = best_next(left, &effect);
-		if (effect && effect != d.causes[i].effect && other.cost < d.final.cost - limits.margin) {
+		if (effect && effect != d.causes[i].effect && merit(other, left) < merit(d.final, left) - limits.margin) {
 			d.final = other;
 			d.causes[i].effect = effect;
 		}
@@ -339,8 +359,13 @@ void Decider::find_rivals()
 			const Fit other = join(problem, cause.without, s.part);
 			if (!other.ok)
 				continue;
-			const bool margin = other.cost - d.final.cost > limits.margin &&
-								paired(problem, problem.held_out(other), ours) > limits.paired;
+			const double t = paired(problem, problem.held_out(other), ours);
+			const double theirs = merit(other, cause.without), mine = merit(d.final, cause.without);
+			const bool margin = theirs - mine > limits.margin && (t > limits.paired || (t > 0 && theirs > 0.8 * mine));
+#ifdef EXPLAIN_TRACE
+			fprintf(stderr, "  rival of %s: %s merit %.1f against %.1f paired %.2f\n", cause.effect->name,
+					s.part.effect->name, merit(other, cause.without), merit(d.final, cause.without), t);
+#endif
 			cause.rivals.push_back({s.part.effect, s.part.effect->name, other.cost - cause.without.cost,
 									testable(s.part.effect), !margin});
 		}

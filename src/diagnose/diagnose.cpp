@@ -65,6 +65,7 @@ class Diagnosis
 	void prepare(Work &work);
 	void noise(Work &work, const VectorXd &y, const Hypothesis &h, bool candidates);
 	void explain(Work &work);
+	void hold_stated(Work &work, Hypothesis &base) const;
 	std::vector<Extra> extras(const Work &work, const std::vector<size_t> &index) const;
 	int extended();
 	void summarise();
@@ -336,6 +337,24 @@ void Diagnosis::noise(Work &work, const VectorXd &y, const Hypothesis &h, bool c
 	}
 }
 
+/* A base parameter that the recording states is the model as given; an effect that does the same holds it there. */
+void Diagnosis::hold_stated(Work &work, Hypothesis &base) const
+{
+	const tactus_domain *domain = work.problem->domain;
+	for (size_t i = 0; i < domain->base_count; i++) {
+		double stated;
+		if (tactus_metadata_get_number(work.evidence.metadata, domain->base[i].name, &stated) != 1)
+			continue;
+		base.base[i] = stated;
+		work.given = base;
+		work.evidence.given = &work.given;
+		for (size_t k = 0; domain->effects[k]; k++)
+			if (domain->effects[k]->held_base == i + 1 && !domain->effects[k]->testable(work.problem->segments.front()))
+				base.base_free.erase(std::remove(base.base_free.begin(), base.base_free.end(), i),
+									 base.base_free.end());
+	}
+}
+
 void Diagnosis::explain(Work &work)
 {
 	if (work.hopeless)
@@ -377,6 +396,8 @@ void Diagnosis::explain(Work &work)
 		work.evidence.given = &work.given;
 		work.evidence.provenance = options.model->provenance;
 	}
+	if (!given)
+		hold_stated(work, base);
 	work.evidence.base = base;
 	const Fit plain = problem.fit(base, Rows::all); /* by least squares, the noise not yet known */
 	if (!plain.ok)
@@ -392,13 +413,14 @@ void Diagnosis::explain(Work &work)
 		return;
 	const Fit &last = d.causes.empty() && d.stale ? d.moved.fit : d.final;
 	Hypothesis h = last.hypothesis;
-	h.base_free = base.base_free;
 	problem.simulate(h, y);
 	noise(work, y, h, false);
 	work.full = problem.fit(h, Rows::all);
 	if (!work.full.ok)
 		work.full = problem.evaluate(h, Rows::all);
 	const MatrixXd &j = work.full.jacobian;
+	if (j.cols() == 0)
+		return;
 	MatrixXd masked = j;
 	for (Index k = 0; k < j.cols(); k++) {
 		VectorXd c = j.col(k);

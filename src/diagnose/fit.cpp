@@ -87,12 +87,23 @@ class Converged : public ceres::IterationCallback
 	const Cost *cost;
 };
 
-bool instant(const tactus_effect *effect, size_t parameter)
+bool searched(const tactus_effect *effect, size_t parameter, enum tactus_search_kind kind)
 {
 	for (size_t i = 0; i < effect->search_count; i++)
-		if (effect->searches[i].parameter == parameter && effect->searches[i].kind == TACTUS_SEARCH_INSTANT)
+		if (effect->searches[i].parameter == parameter && effect->searches[i].kind == kind)
 			return true;
 	return false;
+}
+
+bool instant(const tactus_effect *effect, size_t parameter)
+{
+	return searched(effect, parameter, TACTUS_SEARCH_INSTANT);
+}
+
+/* What has no gradient: Ceres leaves it where it is. */
+bool fixed(const tactus_effect *effect, size_t parameter)
+{
+	return instant(effect, parameter) || searched(effect, parameter, TACTUS_SEARCH_EXACT);
 }
 
 } // namespace
@@ -108,7 +119,7 @@ bool Problem::derivatives(const Hypothesis &h, const VectorXd &y0, const std::ve
 		double &at = value(moved, slot);
 		const double from = at;
 		d.col(Index(j)).setZero();
-		if (slot.part >= 0 && instant(h.parts[size_t(slot.part)].effect, slot.index))
+		if (slot.part >= 0 && fixed(h.parts[size_t(slot.part)].effect, slot.index))
 			continue;
 		for (const double step : {1e-5, 1e-2}) {
 			at = from + slot.scale * step <= slot.info->upper ? from + slot.scale * step : from - slot.scale * step;
@@ -140,16 +151,16 @@ void Problem::finish(Fit &fit, Rows which) const
 			fit.square += fit.residual[i] * fit.residual[i];
 			n++;
 		}
-	double k = 0;
+	fit.parameters = 0;
 	fit.at_bound = false;
 	for (const Slot &slot : fit.slots) {
 		const double v = value(fit.hypothesis, slot);
 		const bool bound = v <= slot.info->lower || v >= slot.info->upper;
 		fit.at_bound = fit.at_bound || (bound && slot.part >= 0 && slot.info->kind == TACTUS_STRENGTH);
 		/* An instant that is sought over the whole recording costs as much as three ordinary parameters. */
-		k += slot.part >= 0 && instant(fit.hypothesis.parts[size_t(slot.part)].effect, slot.index) ? 3 : 1;
+		fit.parameters += slot.part >= 0 && instant(fit.hypothesis.parts[size_t(slot.part)].effect, slot.index) ? 3 : 1;
 	}
-	fit.cost = double(n) * std::log(std::fmax(fit.square, 1e-300) / double(n)) + k * std::log(double(n));
+	fit.cost = double(n) * std::log(std::fmax(fit.square, 1e-300) / double(n)) + fit.parameters * std::log(double(n));
 }
 
 Fit Problem::evaluate(const Hypothesis &h, Rows which) const
@@ -199,9 +210,11 @@ Fit Problem::fit(const Hypothesis &start, Rows which) const
 	result.slots = slots(start);
 	std::vector<Slot> moving;
 	for (const Slot &slot : result.slots)
-		if (slot.part < 0 || !instant(start.parts[size_t(slot.part)].effect, slot.index))
+		if (slot.part < 0 || !fixed(start.parts[size_t(slot.part)].effect, slot.index))
 			moving.push_back(slot);
-	const bool steps = moving.size() < result.slots.size();
+	const bool steps = std::any_of(result.slots.begin(), result.slots.end(), [&](const Slot &slot) {
+		return slot.part >= 0 && instant(start.parts[size_t(slot.part)].effect, slot.index);
+	});
 	for (int round = 0; round < (steps ? 2 : 1) && !moving.empty(); round++) {
 		std::vector<double> values;
 		for (const Slot &slot : moving)

@@ -63,9 +63,10 @@ struct Fit {
 	Hypothesis hypothesis;
 	std::vector<Slot> slots;
 	VectorXd residual;
-	MatrixXd jacobian; /* of the prediction, per slot */
-	double square = 0; /* Σ residual² over the rows that train */
-	double cost = 0;   /* Schwarz's criterion: n log(square / n) + k log n */
+	MatrixXd jacobian;     /* of the prediction, per slot */
+	double square = 0;     /* Σ residual² over the rows that train */
+	double parameters = 0; /* an instant counts as three */
+	double cost = 0;       /* Schwarz's criterion: n log(square / n) + k log n */
 	bool ok = false;
 	bool at_bound = false; /* a strength that was fitted ended at a bound */
 };

@@ -67,6 +67,7 @@ std::vector<double> grid_of(const Problem &problem, const tactus_effect *effect,
 			values.push_back(problem.ranged(info, search.values[i]));
 		break;
 	case TACTUS_SEARCH_PROPOSED:
+	case TACTUS_SEARCH_EXACT:
 		values.resize(24);
 		values.resize(effect->propose ? effect->propose(problem.segments.front(), search.parameter, values.data(), 24)
 									  : 0);
@@ -273,14 +274,17 @@ double Screen::add_best(State &state, const std::vector<Point> &points, Part &pa
 					for (Index e = 0; e < k; e++)
 						g(a, e) = gram(trial[size_t(a)], trial[size_t(e)]);
 				}
-				const VectorXd x = g.ldlt().solve(r);
+				const double taken = point.part.value[point.strengths[size_t(j)]] -
+									 point.part.effect->parameters[point.strengths[size_t(j)]].neutral;
+				/* Where the answer is no line the column holds for the value that it was taken at, and no other. */
+				const VectorXd x = taken != 0 ? VectorXd::Constant(k, taken) : VectorXd(g.ldlt().solve(r));
 				bool inside = x.allFinite();
 				for (Index a = 0; a < k && inside; a++) {
 					const tactus_parameter &info =
 						point.part.effect->parameters[point.strengths[size_t(trial[size_t(a)])]];
 					inside = info.neutral + x[a] >= info.lower && info.neutral + x[a] <= info.upper;
 				}
-				const double gained = r.dot(x);
+				const double gained = 2 * r.dot(x) - x.dot(g * x);
 				if (inside && gained > best_gain) {
 					best_gain = gained;
 					pick = j;
@@ -318,12 +322,7 @@ double Screen::add_best(State &state, const std::vector<Point> &points, Part &pa
 	for (size_t k = 0; k < best.chosen.size(); k++) {
 		const size_t s = best.point->strengths[size_t(best.chosen[k])];
 		const tactus_parameter &info = part.effect->parameters[s];
-		double value = info.neutral + best.coefficients[Index(k)];
-		const double taken = best.point->part.value[s];
-		if (taken != info.neutral) /* a line only near where the column was taken */
-			value = info.neutral +
-					std::clamp((value - info.neutral) / (taken - info.neutral), 0.3, 3.0) * (taken - info.neutral);
-		part.value[s] = std::clamp(value, info.lower, info.upper);
+		part.value[s] = std::clamp(info.neutral + best.coefficients[Index(k)], info.lower, info.upper);
 		part.free.push_back(s);
 		VectorXd column = best.columns.col(best.chosen[k]);
 		state.residual -= column * best.coefficients[Index(k)];

@@ -81,9 +81,10 @@ enum tactus_effect_flags {
 enum tactus_search_kind {
 	TACTUS_SEARCH_TIME, /* time constants, from the step of the clock to the duration; both signs where the bounds are
 						 */
-	TACTUS_SEARCH_INSTANT, /* instants within the recording */
-	TACTUS_SEARCH_VALUES,  /* those of `values`; they scale with the ranges as `start` does */
-	TACTUS_SEARCH_PROPOSED /* what `propose` reads off the series */
+	TACTUS_SEARCH_INSTANT,  /* instants within the recording */
+	TACTUS_SEARCH_VALUES,   /* those of `values`; they scale with the ranges as `start` does */
+	TACTUS_SEARCH_PROPOSED, /* what `propose` reads off the series */
+	TACTUS_SEARCH_EXACT     /* the same, and no other value near it: it has no gradient */
 };
 
 typedef struct {
@@ -121,6 +122,11 @@ struct tactus_effect {
 	int (*term)(size_t parameter); /* the term that a parameter belongs to, from 0; NULL: all of them to 0 */
 	/* Values that a TACTUS_SEARCH_PROPOSED parameter may have in this series, at most `most`; NULL if there is none. */
 	size_t (*propose)(const struct tactus_series *series, size_t parameter, double *values, size_t most);
+	/*
+	 * One more than the index of the base parameter that does the same; 0: none does. Where the recording states that
+	 * parameter it is held, so that the effect can be seen; where it does not, the effect is not testable.
+	 */
+	size_t held_base;
 	/* A cause outside this catalogue with exactly the same mark: its name, and what separates them; NULL if none. */
 	const char *twin, *twin_separated_by;
 	/* True if the recording's metadata or columns exclude the twin. NULL: nothing can. */

@@ -30,5 +30,6 @@ const struct tactus_effect tactus_effect_readout_gain_error = {
 	.stage = READOUT_STAGE_DETECTOR,
 	TACTUS_PARAMETERS(parameters),
 	.process = process,
+	.held_base = READOUT_BASE_RG + 1,
 	.testable = testable,
 };
