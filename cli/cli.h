@@ -129,6 +129,7 @@ void cli_catch_signals(void);
 /* --json results and JSON Lines of our own: a small writer with the contract's shortest numbers. */
 struct cli_json;
 struct cli_json *cli_json_begin(void);                        /* on standard output, opens the outermost object */
+struct cli_json *cli_json_open(FILE *out);                    /* the same on any stream */
 void cli_json_object(struct cli_json *json, const char *key); /* key NULL inside an array */
 void cli_json_array(struct cli_json *json, const char *key);
 void cli_json_close(struct cli_json *json);                                      /* the innermost object or array */
@@ -136,6 +137,20 @@ void cli_json_string(struct cli_json *json, const char *key, const char *value);
 void cli_json_number(struct cli_json *json, const char *key, double value);      /* NaN: null */
 void cli_json_bool(struct cli_json *json, const char *key, bool value);
 int cli_json_end(struct cli_json *json); /* closes everything, prints, frees; 0 or an exit status */
+
+/*
+ * Text that -o FILE takes (NULL or "-": standard output): written beside and renamed by close. Each returns 0, or an
+ * exit status with the message printed; a file that exists is refused without --overwrite.
+ */
+struct cli_output {
+	FILE *stream;
+	const char *path;
+	char *beside, *real;
+};
+int cli_output_refuse(const struct cli *cli, const char *path); /* early, before any work is done */
+int cli_output_open(const struct cli *cli, const char *path, struct cli_output *output);
+int cli_output_close(const struct cli *cli, struct cli_output *output);
+void cli_output_abort(struct cli_output *output);
 
 /* A run over a recording, block by block: read, process, write, flush when no more input waits. Returns a status. */
 typedef int (*cli_block_function)(void *context, tactus_table *block); /* 0 or a tactus_error */

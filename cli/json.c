@@ -59,14 +59,19 @@ static void open_level(struct cli_json *json, char opening, char closing)
 	json->depth++;
 }
 
-struct cli_json *cli_json_begin(void)
+struct cli_json *cli_json_open(FILE *out)
 {
 	struct cli_json *json = calloc(1, sizeof *json);
 	if (!json)
 		abort();
-	json->out = stdout;
+	json->out = out;
 	open_level(json, '{', '}');
 	return json;
+}
+
+struct cli_json *cli_json_begin(void)
+{
+	return cli_json_open(stdout);
 }
 
 void cli_json_object(struct cli_json *json, const char *key)
@@ -118,6 +123,7 @@ int cli_json_end(struct cli_json *json)
 	while (json->depth)
 		cli_json_close(json);
 	fputc('\n', json->out);
+	bool standard = json->out == stdout;
 	free(json);
-	return cli_finish_stdout(CLI_OK);
+	return standard ? cli_finish_stdout(CLI_OK) : CLI_OK;
 }
