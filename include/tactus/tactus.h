@@ -13,6 +13,7 @@
 #define TACTUS_TACTUS_H
 
 #include <tactus/device.h>
+#include <tactus/diagnose.h>
 #include <tactus/error.h>
 #include <tactus/fit.h>
 #include <tactus/join.h>

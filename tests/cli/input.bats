@@ -2,7 +2,7 @@
 # Bad input on every command that reads a recording: status 3, a clear message with FILE:LINE, nothing written.
 load common
 
-readers="convert fit force simulate show"
+readers="convert fit force simulate show diagnose"
 
 # bad FILE [WHERE]: every reader refuses FILE, naming WHERE (default: the file), and leaves no output behind.
 bad() {

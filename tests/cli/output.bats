@@ -5,7 +5,7 @@ load common
 model=$examples/model-forward.toml
 writers() { # every command that writes a recording or a file, given run.csv
 	printf '%s\n' "scan sim: --count 5" "convert scan.csv" "fit run.csv" "force -m $model run.csv" \
-		"simulate -m $model run.csv" "join run.csv run.csv"
+		"simulate -m $model run.csv" "join run.csv run.csv" "diagnose run.csv"
 }
 prepare() {
 	recording >run.csv

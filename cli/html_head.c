@@ -1,0 +1,72 @@
+/* Head and style sheet of the page: for a phone, a desk and paper, light and dark; nothing is fetched. */
+#include "html.h"
+
+static const char style[] =
+	":root{color-scheme:light dark;--paper:#fff;--ink:#1a1d21;--soft:#5b6570;--line:#d9dee3;--card:#f4f6f8;"
+	"--grid:#d0d5da;--before:#c2500a;--after:#0068a8;--effect:#00875f;--measured:#7a7a7a;--dim:#a3a9af;--bar:#8fb4cc;"
+	"--good:#00734f;--warn:#8a5a00;--bad:#b3261e}\n"
+	"@media (prefers-color-scheme:dark){:root{--paper:#14171a;--ink:#e6e9ec;--soft:#a0a9b2;--line:#343a40;"
+	"--card:#1e2327;--grid:#3a4046;--before:#ff9a5c;--after:#5bb8f0;--effect:#3fd0a0;--measured:#9aa0a6;--dim:#767d84;"
+	"--bar:#44708c;--good:#4fd1a5;--warn:#f0b955;--bad:#ff8a80}}\n"
+	"*{box-sizing:border-box}\n"
+	"html{-webkit-text-size-adjust:100%}\n"
+	"body{margin:0 auto;max-width:68rem;padding:1rem;background:var(--paper);color:var(--ink);"
+	"font:1rem/1.5 system-ui,-apple-system,'Segoe UI',Roboto,'Liberation Sans',sans-serif;overflow-wrap:break-word}\n"
+	"h1{font-size:1.6rem;line-height:1.25;margin:.2rem 0 .6rem}\n"
+	"h2{font-size:1.3rem;line-height:1.3;margin:2rem 0 .6rem;padding-top:.8rem;border-top:1px solid var(--line)}\n"
+	"h3{font-size:1.08rem;margin:1.6rem 0 .4rem}\n"
+	"h4{font-size:.95rem;margin:0 0 .2rem}\n"
+	"p{margin:.4rem 0;max-width:46rem}\n"
+	".kicker,figcaption,footer,.soft{color:var(--soft);font-size:.9rem}\n"
+	".good{color:var(--good)}.warn{color:var(--warn)}.bad{color:var(--bad)}\n"
+	".cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(9.2rem,1fr));gap:.6rem;margin:1rem 0;padding:0;"
+	"list-style:none}\n"
+	".cards li{background:var(--card);border-radius:.5rem;padding:.6rem .8rem;font-size:.9rem;line-height:1.35;"
+	"color:var(--soft)}\n"
+	".cards strong{display:block;font-size:1.45rem;line-height:1.3;color:var(--ink);font-weight:650}\n"
+	".figures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,24rem),1fr));gap:1.2rem 1.6rem;"
+	"align-items:start}\n"
+	"figure{margin:.8rem 0;break-inside:avoid}\n"
+	"svg{display:block;width:100%;height:auto}\n"
+	"figcaption p{margin:.15rem 0}\n"
+	".legend span{margin-right:.9rem;white-space:nowrap;color:var(--ink)}\n"
+	".legend i{display:inline-block;width:.75em;height:.75em;border-radius:50%;margin-right:.35em;"
+	"print-color-adjust:exact}\n"
+	".scroll{overflow-x:auto;margin:.5rem 0}\n"
+	"table{border-collapse:collapse;font-size:.92rem;min-width:min(100%,30rem)}\n"
+	"th,td{text-align:left;padding:.3rem .8rem .3rem 0;border-bottom:1px solid var(--line);vertical-align:top}\n"
+	"th{font-weight:600;color:var(--soft)}\n"
+	"td.number,th.number{font-variant-numeric:tabular-nums}\n"
+	"td.number{white-space:nowrap}\n"
+	".figures>*{min-width:0}.inner table{min-width:0}a{color:var(--after)}\n"
+	"tr{break-inside:avoid}\n"
+	"tr.named td{font-weight:600}\n"
+	"pre{background:var(--card);border-radius:.5rem;padding:.7rem .8rem;white-space:pre-wrap;overflow-wrap:anywhere;"
+	"font:.88rem/1.45 ui-monospace,'DejaVu Sans Mono',monospace;margin:.5rem 0}\n"
+	"details{border-bottom:1px solid var(--line)}\n"
+	"summary{cursor:pointer;padding:.7rem 0;font-weight:600}\n"
+	"details h2{display:none}\n"
+	"details.inner{border:0}details.inner>summary{font-weight:400;color:var(--soft);padding:.3rem 0}\n"
+	"ul.plain{margin:.4rem 0;padding-left:1.2rem}\n"
+	"footer{margin-top:2.5rem;padding-top:.8rem;border-top:1px solid var(--line)}\n"
+	"@media (max-width:30rem){body{padding:.8rem}table{font-size:.86rem}th,td{padding-right:.55rem}"
+	".cards{grid-template-columns:1fr 1fr}.cards strong{font-size:1.25rem}}\n"
+	"@media print{:root{color-scheme:light;--paper:#fff;--ink:#000;--soft:#444;--line:#ccc;--card:#f2f2f2;--grid:#ccc;"
+	"--before:#c2500a;--after:#0068a8;--effect:#00875f;--measured:#7a7a7a;--dim:#999;--bar:#8fb4cc;--good:#00734f;"
+	"--warn:#8a5a00;--bad:#b3261e}html{font-size:10pt}body{max-width:none;padding:0}.cards{grid-template-columns:"
+	"repeat(4,1fr)}.cards strong{font-size:13pt}.figures{grid-template-columns:1fr 1fr;break-inside:auto;gap:.6rem "
+	"1.2rem}"
+	"details::details-content{content-visibility:visible;display:block}details h2{display:block}summary{display:none}"
+	"h2,h3,h4{break-after:avoid}pre,.cards li{print-color-adjust:exact}}\n";
+
+void html_head(const struct html *html, const char *title)
+{
+	fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+		  "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+		  "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
+		  "img-src data:\">\n<link rel=\"icon\" href=\"data:,\">\n",
+		  html->out);
+	html_element(html, "title", title);
+	fprintf(html->out, "<meta name=\"generator\" content=\"tactus %s\">\n<style>\n%s</style>\n</head>\n<body>\n",
+			tactus_version(), style);
+}

@@ -1,0 +1,372 @@
+#!/usr/bin/env bats
+# tactus diagnose: every option, every exit status, the contract's JSON, input that it must survive.
+load common
+
+verdicts="cause-found nothing-wrong unexplained ambiguous stale-calibration bad-recording"
+
+# Recordings that several tests read, made once: a sensor that creeps, one that does what the base equations say.
+setup_file() {
+	cd "$BATS_FILE_TMPDIR" || return
+	loads="rest 5s, hold 150N 30s, rest 20s, hold 90N 30s, rest 20s, staircase 0N..180N 30N 2s, rest 20s"
+	cat >creep.toml <<-'EOB'
+		kind = "bench"
+		base = "paredes"
+		name = "creeping"
+		seed = 3
+		[scan]
+		rate_Hz = 5
+		[[effect]]
+		name = "creep"
+		amplitude_1 = 0.03
+		amplitude_10 = 0.06
+	EOB
+	tactus scan sim:creep.toml --protocol "$loads" --channels 1 --mode dc -q -o creep.csv
+	tactus scan sim:creep.toml --protocol "$loads" --channels 1-3 --mode dc -q -o three.csv
+	cat >plain.toml <<-'EOM'
+		kind = "model"
+		format = 1
+		domain = "sensor"
+		form = "forward"
+		[output.conductance_S]
+		[[channel]]
+		channel = 1
+		input_range = [0, 200]
+		base = { g0 = 1.2e-6, g1 = 4.1e-7 }
+		[channel.reading.conductance_S]
+		residual_std = 4.1e-8
+	EOM
+	tactus simulate -m plain.toml --protocol "$loads" --rate 5Hz --noise --seed 4 -o plain.csv
+	sed 's/g1 = 4.1e-7/g1 = 3.4e-7/' plain.toml >stale.toml
+}
+setup() {
+	cd "$BATS_TEST_TMPDIR" || return
+	PYTHON=${PYTHON:-python3}
+	creep=$BATS_FILE_TMPDIR/creep.csv three=$BATS_FILE_TMPDIR/three.csv
+	plain=$BATS_FILE_TMPDIR/plain.csv model=$BATS_FILE_TMPDIR/plain.toml stale=$BATS_FILE_TMPDIR/stale.toml
+}
+
+# What must hold of every result on standard input, whatever the recording: the contract's keys, in its order.
+contract() {
+	jq -e --arg verdicts "$verdicts" '
+		def number_or_null: type == "number" or . == null;
+		def interval: type == "array" and length == 2 and all(.[]; number_or_null);
+		(keys_unsorted == ["recordings","domain","verdict","summary","problems","series","extended_model"]) and
+		(.verdict as $v | $verdicts | split(" ") | index($v) != null) and (.summary | length > 0) and
+		(all(.problems[]; keys_unsorted == ["kind","text","rows"])) and
+		(all(.series[];
+			(keys_unsorted == ["channel","samples","verdict","base","wrong","causes","structure_remains","unexplained",
+				"not_testable","gain","next_experiment","candidates"]) and
+			(all(.base[]; keys_unsorted == ["output","unit","rmse","refit_rmse","noise_floor"])) and
+			(all(.wrong[]; keys_unsorted == ["covariate","explained","p_value","text"])) and
+			(all(.causes[];
+				(keys_unsorted == ["effect","summary","source","parameters","evidence","rivals"]) and
+				(all(.parameters[]; keys_unsorted == ["name","value","unit","standard_error"])) and
+				(.evidence | keys_unsorted == ["delta_bic","held_out_gain","held_out_gain_ci95","p_value"]) and
+				(.evidence.held_out_gain_ci95 | interval) and
+				(all(.rivals[]; keys_unsorted == ["effect","delta_bic","testable"])))) and
+			(.structure_remains | type == "boolean") and
+			(all(.unexplained[]; keys_unsorted == ["covariate","explained","text"])) and
+			(all(.not_testable[]; keys_unsorted == ["effect","why"])) and
+			(.gain == null or (.gain | keys_unsorted == ["rmse_before","rmse_after","unit","reduction","ci95",
+				"of_explainable","force_rmse_before_N","force_rmse_after_N"] and (.ci95 | interval))) and
+			(.next_experiment == null or (.next_experiment | keys_unsorted == ["separates","command","text"])) and
+			(all(.candidates[]; keys_unsorted == ["effect","delta_bic","why"]))))' >/dev/null
+}
+
+# survives FILE OPTION…: a verdict that is no confident name, or an error that says something; never a crash.
+survives() {
+	run --separate-stderr tactus diagnose "$@" --json
+	case $status in
+	0)
+		contract <<<"$output" || fail "not the contract's JSON"
+		verdict=$(jq -r .verdict <<<"$output")
+		[[ $verdict != cause-found ]] || fail "a confident name: $(jq -r .summary <<<"$output")"
+		tactus diagnose "$@" >/dev/null || fail "the page fails where the JSON does not"
+		;;
+	1 | 2 | 3) says "tactus diagnose: " ;;
+	*) fail "status $status" ;;
+	esac
+}
+
+# ---- what it finds --------------------------------------------------------------------------------------------------
+
+@test "creep is named, sized and gained on; the page says so in about a dozen lines of at most 80 columns" {
+	run --separate-stderr tactus diagnose "$creep"
+	status_is 0
+	[ -z "$stderr" ]
+	[[ ${lines[0]} == *" off by "*"N. Cause"*"creep"* ]] || fail "the first line: ${lines[0]}"
+	for word in Measured Cause "How sure" Gain "Not tested" Next; do prints $'\n'"$word "; done
+	prints "the noise floor"
+	prints "tactus diagnose $creep --extended extended.toml"
+	[ "${#lines[@]}" -le 24 ] || fail "${#lines[@]} lines"
+	if grep -v '^  tactus' <<<"${output//$creep/creep.csv}" | LC_ALL=C.UTF-8 grep -E '^.{81}'; then fail "wider than 80 columns"; fi
+	tactus diagnose "$creep" --json | jq -e '.verdict == "cause-found" and .series[0].causes[0].effect == "creep" and
+		.series[0].gain.reduction > 0.2 and .series[0].causes[0].evidence.delta_bic < -10'
+}
+
+@test "--json: the contract's keys in its order, shortest numbers, for every verdict seen here" {
+	for args in "$creep" "$plain" "$three" "$plain -m $stale" "$plain -m $model"; do
+		tactus diagnose $args --json >result.json
+		contract <result.json || fail "$args"
+		"$PYTHON" - <<-'EOP'
+			import json, re
+			text = open("result.json").read()
+			for n in re.findall(r"(?<=[ \[])-?[0-9][0-9.e+-]*", re.sub(r'"(\\.|[^"\\])*"', '""', text)):
+			    assert len(n) <= len(repr(float(n))) + 1, n
+		EOP
+	done
+}
+
+@test "nothing wrong, stale calibration: said as such" {
+	tactus diagnose "$plain" -m "$model" --json | jq -e '.verdict == "nothing-wrong" and (.series[0].causes | length == 0)'
+	run --separate-stderr tactus diagnose "$plain" -m "$model"
+	prints "Nothing wrong"
+	# ambiguous where what the recording cannot test (another drive, say) would do the same
+	tactus diagnose "$plain" -m "$stale" --json | jq -e '(.verdict == "stale-calibration" or .verdict == "ambiguous") and
+		.series[0].causes[0].effect == "stale-calibration" and
+		any(.series[0].causes[0].parameters[]; .name == "g1" and (.value / 4.1e-7 - 1 | fabs) < 0.02)'
+	run --separate-stderr tactus diagnose "$plain" -m "$stale"
+	prints "stale"
+	prints "g1 was "
+}
+
+@test "--exit-verdict: each verdict has its status, from 10 on; without it 0; a full disk is worse" {
+	head -n "$(($(grep -n '^time_s' "$creep" | cut -d: -f1) + 10))" "$creep" >ten.csv
+	order=(cause-found nothing-wrong unexplained ambiguous stale-calibration bad-recording)
+	seen=
+	for args in "$creep" "$plain -m $model" "$plain -m $stale" "$creep -m $model" ten.csv; do
+		run --separate-stderr tactus diagnose $args --exit-verdict --json
+		[ "$status" -lt 10 ] && continue
+		[ "${order[status - 10]}" = "$(jq -r .verdict <<<"$output")" ] || fail "$args: status $status"
+		seen+=" $status"
+		run --separate-stderr tactus diagnose $args
+		status_is 0
+	done
+	for s in 10 11 15; do [[ $seen == *" $s"* ]] || fail "only$seen"; done
+	run --separate-stderr bash -c "tactus diagnose $creep --exit-verdict >/dev/full"
+	status_is 6
+}
+
+@test "several channels: said together, then a line for each" {
+	run --separate-stderr tactus diagnose "$three"
+	status_is 0
+	[[ ${lines[0]} == *"3 of 3 sensors"* ]] || fail "${lines[0]}"
+	for c in 1 2 3; do grep -q "^      $c  cause found .*creep" <<<"$output" || fail "channel $c"; done
+	tactus diagnose "$three" --json | jq -e '[.series[].channel] == [1, 2, 3]'
+}
+
+@test "several recordings are one experiment" {
+	tactus scan sim:"$BATS_FILE_TMPDIR/creep.toml" --protocol "rest 5s, hold 100N 30s, rest 20s" --channels 1 --mode dc -q -o more.csv
+	tactus diagnose "$creep" more.csv --json >result.json
+	contract <result.json
+	jq -e --arg a "$creep" '.recordings == [$a, "more.csv"]' result.json
+}
+
+# ---- options --------------------------------------------------------------------------------------------------------
+
+@test "--extended writes a model that force, simulate and fit accept, and names it in the JSON" {
+	tactus diagnose "$creep" --json --extended better.toml >result.json
+	[ "$(jq -r .extended_model result.json)" = better.toml ]
+	[ "$(tactus diagnose "$creep" --json | jq .extended_model)" = null ]
+	tactus show better.toml --json | jq -e '.effects | index("creep") != null'
+	tactus force -m better.toml "$creep" >newtons.csv
+	tactus simulate -m better.toml "$creep" >simulated.csv
+	tactus fit -m better.toml --domain sensor "$creep" -q >/dev/null
+	run --separate-stderr tactus diagnose "$creep" --extended better.toml
+	status_is 2
+	says "better.toml: exists already"
+	tactus diagnose "$creep" --extended better.toml --overwrite >page
+	grep -q "better.toml" page
+	# what is explained stays explained
+	tactus diagnose "$creep" -m better.toml --json | jq -e '[.series[0].causes[].effect] | index("creep") == null'
+}
+
+@test "-o takes the page or the JSON, refuses an existing file, --overwrite replaces it" {
+	for how in "" --json; do
+		tactus diagnose "$creep" $how >expected
+		tactus diagnose "$creep" $how -o out
+		cmp expected out
+		run --separate-stderr tactus diagnose nosuch.csv $how -o out
+		status_is 2
+		says "out: exists already"
+		tactus diagnose "$creep" $how -o out --overwrite
+		rm out
+	done
+	tactus diagnose "$creep" --extended - -o page | tactus show /dev/stdin --json | jq -e '.kind == "model"'
+	run --separate-stderr tactus diagnose "$creep" --extended -
+	status_is 2
+	says "-o FILE"
+	run --separate-stderr tactus diagnose "$creep" --extended x -o x
+	status_is 2
+}
+
+@test "standard input, as - and in a pipe" {
+	expected=$(tactus diagnose "$creep" --json | jq -c .series)
+	[ "$(tactus diagnose --json <"$creep" | jq -c .series)" = "$expected" ]
+	[ "$(tactus diagnose - --json <"$creep" | jq -c .series)" = "$expected" ]
+	run --separate-stderr bash -c "tactus diagnose - - <$creep"
+	status_is 2
+	says "standard input"
+}
+
+@test "--jobs 1 and --jobs 2 give the same bytes; --seed repeats, and moves the intervals only" {
+	for how in "" --json; do
+		tactus diagnose "$three" $how --jobs 1 >a
+		tactus diagnose "$three" $how --jobs 2 >b
+		cmp a b
+	done
+	tactus diagnose "$three" --report one --jobs 1 >/dev/null
+	tactus diagnose "$three" --report two --jobs 2 >/dev/null
+	cmp <(sed 's/--report one/--report two/' one/index.html) two/index.html
+	tactus diagnose "$creep" --json --seed 1 >a
+	tactus diagnose "$creep" --json | cmp - a
+	tactus diagnose "$creep" --json --seed 2 >b
+	for f in a b; do jq -c '[.verdict, .series[0].causes[0].parameters, .series[0].gain.reduction]' $f >$f.kept; done
+	cmp a.kept b.kept
+	if cmp -s a b; then fail "the seed changes nothing"; fi
+}
+
+@test "--input, --output and --domain let other columns play" {
+	sed 's/^time_s,sequence,channel,force_N/time_s,sequence,channel,load_kg/; s/conductance_S/reading_uS/' "$plain" >renamed.csv
+	run --separate-stderr tactus diagnose renamed.csv
+	status_is 3
+	tactus diagnose renamed.csv --domain sensor --input load_kg --output reading_uS --json >result.json
+	contract <result.json
+	jq -e '.domain == "sensor" and .series[0].base[0].output == "reading_uS"' result.json
+	tactus diagnose renamed.csv --columns force_N=load_kg,conductance_S=reading_uS --json | jq -e '.series[0].base[0].output == "conductance_S"'
+}
+
+@test "CSV of other people: --delimiter, --decimal-comma" {
+	grep -v '^#' "$plain" | sed 's/,/;/g; s/\./,/g' >foreign.csv
+	expected=$(tactus diagnose "$plain" --json | jq -c .series)
+	[ "$(tactus diagnose foreign.csv --decimal-comma --json | jq -c .series)" = "$expected" ]
+	[ "$(tactus diagnose foreign.csv --decimal-comma --delimiter ';' --json | jq -c .series)" = "$expected" ]
+}
+
+@test "-m takes a bench; --device is what the next experiment is written for" {
+	tactus diagnose "$creep" -m sim:paredes --json >result.json
+	contract <result.json
+	for f in "$creep" "$plain"; do
+		tactus diagnose "$f" --device modbus-tcp://bench --json >result.json
+		jq -e 'all(.series[]; .next_experiment == null or (.next_experiment.command | contains("modbus-tcp://bench")))' result.json
+	done
+}
+
+@test "a readout recording is diagnosed as one" {
+	tactus diagnose "$examples/recording-readout.csv" --domain readout --json >result.json
+	contract <result.json
+	jq -e '.domain == "readout" and (.series | length > 0)' result.json
+}
+
+# ---- what is refused ------------------------------------------------------------------------------------------------
+
+@test "an estimator is status 2; what cannot be read, or is of another domain, says so" {
+	run --separate-stderr tactus diagnose "$creep" -m "$examples/model-linear.toml"
+	status_is 2
+	says "estimator"
+	run --separate-stderr tactus diagnose "$creep" -m "$examples/model-readout.toml"
+	[ "$status" -eq 1 ] || [ "$status" -eq 3 ] || fail "status $status"
+	says "readout"
+	run --separate-stderr tactus diagnose "$creep" -m nosuch.toml
+	status_is 3
+	says nosuch.toml
+	run --separate-stderr tactus diagnose nosuch.csv
+	status_is 3
+	says nosuch.csv
+	run --separate-stderr tactus diagnose "$creep" nosuch.csv
+	status_is 3
+	run --separate-stderr tactus diagnose "$creep" --domain wrench
+	status_is 2
+	run --separate-stderr tactus diagnose "$creep" --output nosuch_S
+	status_is 3
+	says nosuch_S
+}
+
+# ---- bad input ------------------------------------------------------------------------------------------------------
+
+# Rows of a sensor recording on standard output, made by an awk body that may set t, f (N), g (S) and x.
+made() {
+	awk -v n="${2:-600}" "BEGIN {
+		print \"time_s,sequence,channel,force_N,conductance_S,extra\"
+		srand(1)
+		for (i = 0; i < n; i++) {
+			t = i / 10; f = i % 200 < 100 ? i % 200 : 200 - i % 200; x = rand() - 0.5
+			g = 1e-6 + 4e-7 * f + 2e-8 * (rand() + rand() + rand() - 1.5)
+			$1
+			printf \"%.10g,%d,1,%s,%s,%.10g\n\", t, i, f, g, x
+		}
+	}"
+}
+
+@test "ten rows, two rows, one row" {
+	for n in 10 2 1; do
+		made "" $n >few.csv
+		survives few.csv
+	done
+}
+
+@test "a constant output, an input that never moves, both" {
+	made 'g = 1e-6' >a.csv
+	made 'f = 50' >b.csv
+	made 'f = 50; g = 2e-5' >c.csv
+	made 'f = 0; g = 0' >d.csv
+	for f in a b c d; do survives $f.csv; done
+}
+
+@test "missing values in the middle; nothing but missing values" {
+	made 'if (i > 200 && i < 260) g = ""; if (i % 37 == 0) f = ""' >gaps.csv
+	survives gaps.csv
+	made 'g = ""' >none.csv
+	survives none.csv
+	made 'f = ""' >none.csv
+	survives none.csv
+}
+
+@test "the columns of two domains at once; a model of another domain" {
+	made "" | awk -F, -v OFS=, '{ print $0, NR == 1 ? "reference_resistance_ohm,frequency_Hz,phase_rad,amplitude_V" : "1000,1000,0.1,1" }' >both.csv
+	survives both.csv
+	survives both.csv --domain sensor
+	survives both.csv --domain readout
+	survives both.csv -m "$examples/model-readout.toml"
+}
+
+@test "fifty columns that mean nothing" {
+	made "" 400 | awk -F, -v OFS=, '{ srand(NR); for (k = 1; k <= 50; k++) $0 = $0 OFS (NR == 1 ? "column" k : rand()); print }' >wide.csv
+	survives wide.csv
+}
+
+@test "amplitudes of 1e-12 and 1e12, of output, input and clock" {
+	for scale in 1e-12 1e12; do
+		made "g *= $scale" >g.csv
+		made "f *= $scale" >f.csv
+		made "t *= $scale" >t.csv
+		for f in g f t; do
+			survives $f.csv
+			tactus diagnose $f.csv --report report --overwrite >/dev/null || [ "$?" -eq 3 ]
+		done
+	done
+}
+
+@test "a clock that stands still, runs backwards, or is not there" {
+	made 't = 5' >a.csv
+	made 't = -t' >b.csv
+	made "" | cut -d, -f2- >c.csv
+	made "" | cut -d, -f3- >d.csv
+	for f in a b c d; do survives $f.csv; done
+	tactus diagnose c.csv --json | jq -e '[.series[0].not_testable[].effect] | index("creep") != null'
+}
+
+@test "wild readings are excluded, and said" {
+	made 'if (i == 77 || i == 300) g = 1' >wild.csv
+	survives wild.csv
+	tactus diagnose wild.csv --json | jq -e 'any(.problems[]; .kind == "outliers")'
+	tactus diagnose wild.csv | head -1 | grep -q '^Problem'
+}
+
+@test "colour on a terminal, but not with NO_COLOR" {
+	type script >/dev/null || skip "script(1) is not installed"
+	TERM=xterm script -qec "tactus diagnose $creep" /dev/null >on
+	grep -q $'\033' on
+	NO_COLOR=1 TERM=xterm script -qec "tactus diagnose $creep" /dev/null >off
+	if grep -q $'\033' off; then fail "coloured"; fi
+}
