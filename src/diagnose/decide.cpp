@@ -11,13 +11,17 @@ namespace tactus::explain
 
 const Limits limits;
 
-double paired(const Problem &problem, const std::vector<double> &a, const std::vector<double> &b)
+namespace
+{
+
+/* Mean over standard error of what each training block says for b, in squares or in their logarithm. */
+double paired_in(const Problem &problem, const std::vector<double> &a, const std::vector<double> &b, bool logarithm)
 {
 	double sum = 0, square = 0, n = 0;
 	for (size_t k = 0; k < a.size(); k++) {
 		if (problem.test[k] || (a[k] == 0 && b[k] == 0))
 			continue;
-		const double d = std::log((a[k] + 1) / (b[k] + 1)); /* no single block decides */
+		const double d = logarithm ? std::log((a[k] + 1) / (b[k] + 1)) : a[k] - b[k];
 		sum += d;
 		square += d * d;
 		n++;
@@ -26,6 +30,14 @@ double paired(const Problem &problem, const std::vector<double> &a, const std::v
 		return 0;
 	const double mean = sum / n, variance = (square / n - mean * mean) * n / (n - 1);
 	return variance > 0 ? mean / std::sqrt(variance / n) : sum > 0 ? INFINITY : 0;
+}
+
+} // namespace
+
+/* A strong effect in every block shows in the logarithms, a weak one in some blocks in the squares. */
+double paired(const Problem &problem, const std::vector<double> &a, const std::vector<double> &b)
+{
+	return std::fmax(paired_in(problem, a, b, true), paired_in(problem, a, b, false));
 }
 
 namespace
@@ -217,7 +229,7 @@ class Decider
 		return effect->testable(problem.segments.front()) == nullptr;
 	}
 	std::vector<Scored> screen(const Fit &fit, bool all) const;
-	Fit best_next(const Fit &fit, const tactus_effect **effect) const;
+	Fit best_next(const Fit &fit, const tactus_effect **effect, bool standing) const;
 	bool stands(const Fit &with, const Fit &without, double removed) const;
 	Fit without(const Fit &fit, const tactus_effect *effect) const;
 	void select();
@@ -251,7 +263,7 @@ std::vector<Scored> Decider::screen(const Fit &fit, bool all) const
 }
 
 /* The best of the few that look best, fitted jointly. */
-Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
+Fit Decider::best_next(const Fit &fit, const tactus_effect **effect, bool standing) const
 {
 	Fit best;
 	*effect = nullptr;
@@ -265,7 +277,8 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 		fprintf(stderr, "  try %s linear %.1f joint %.1f ok %d\n", s.part.effect->name, s.cost,
 				joined.ok ? joined.cost - fit.cost : NAN, joined.ok);
 #endif
-		if (joined.ok && (!best.ok || merit(joined, fit) < merit(best, fit))) {
+		if (joined.ok && (!standing || stands(joined, fit, d.base.square - fit.square)) &&
+			(!best.ok || merit(joined, fit) < merit(best, fit))) {
 			best = joined;
 			*effect = s.part.effect;
 		}
@@ -276,6 +289,12 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 bool Decider::stands(const Fit &with, const Fit &without, double removed) const
 {
 	const double gain = without.square - with.square;
+	/* A jump shows at its instant: the block that holds it cannot be foretold from the others. */
+	const auto instants = std::count_if(with.slots.begin(), with.slots.end(), [&](const Slot &slot) {
+		return slot.part >= 0 && !without.hypothesis.has(with.hypothesis.parts[size_t(slot.part)].effect) &&
+			   instant(with.hypothesis.parts[size_t(slot.part)].effect, slot.index);
+	});
+	const bool jumps = instants == 1 || instants == 2; /* more are a staircase, which must foretell */
 #ifdef EXPLAIN_TRACE
 	fprintf(stderr, "  stands? ok %d evidence %.1f share %.3f further %.3f paired %.2f (n %ld square %.0f -> %.0f)\n",
 			with.ok, without.cost - with.cost, gain / without.square, gain / (removed + gain),
@@ -284,7 +303,8 @@ bool Decider::stands(const Fit &with, const Fit &without, double removed) const
 #endif
 	return with.ok && without.cost - with.cost > limits.evidence && gain > limits.share * without.square &&
 		   gain > limits.further_share * (removed + gain) &&
-		   paired(problem, problem.held_out(without), problem.held_out(with)) > limits.paired;
+		   ((jumps && without.cost - with.cost > limits.jump && gain > limits.jump_share * without.square) ||
+			paired(problem, problem.held_out(without), problem.held_out(with)) > limits.paired);
 }
 
 Fit Decider::without(const Fit &fit, const tactus_effect *effect) const
@@ -299,8 +319,8 @@ void Decider::select()
 	d.final = d.base;
 	while (d.causes.size() < limits.causes) {
 		const tactus_effect *effect;
-		const Fit next = best_next(d.final, &effect);
-		if (!effect || !stands(next, d.final, d.base.square - d.final.square))
+		const Fit next = best_next(d.final, &effect, true);
+		if (!effect)
 			return;
 		d.final = next;
 		d.causes.push_back({effect, {}, 0, 1, {}});
@@ -332,7 +352,7 @@ void Decider::exchange()
 		if (!left.ok)
 			continue;
 		const tactus_effect *effect;
-		const Fit other = best_next(left, &effect);
+		const Fit other = best_next(left, &effect, false);
 		if (effect && effect != d.causes[i].effect && merit(other, left) < merit(d.final, left) - limits.margin) {
 			d.final = other;
 			d.causes[i].effect = effect;

@@ -87,6 +87,8 @@ class Converged : public ceres::IterationCallback
 	const Cost *cost;
 };
 
+} // namespace
+
 bool searched(const tactus_effect *effect, size_t parameter, enum tactus_search_kind kind)
 {
 	for (size_t i = 0; i < effect->search_count; i++)
@@ -99,6 +101,9 @@ bool instant(const tactus_effect *effect, size_t parameter)
 {
 	return searched(effect, parameter, TACTUS_SEARCH_INSTANT);
 }
+
+namespace
+{
 
 /* What has no gradient: Ceres leaves it where it is. */
 bool fixed(const tactus_effect *effect, size_t parameter)

@@ -71,6 +71,10 @@ struct Fit {
 	bool at_bound = false; /* a strength that was fitted ended at a bound */
 };
 
+/* True if a parameter is an instant that is sought over the recording. */
+bool instant(const tactus_effect *effect, size_t parameter);
+bool searched(const tactus_effect *effect, size_t parameter, enum tactus_search_kind kind);
+
 /* Which rows a fit may see. */
 enum class Rows { train, all };
 

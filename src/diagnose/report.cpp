@@ -101,7 +101,9 @@ std::string sentence(const Work &work, const tactus_effect *effect)
 	VectorXd centred = moved;
 	for (const Run &run : problem.runs)
 		centred.segment(run.first, run.count).array() -= moved.segment(run.first, run.count).mean();
-	const double rms = rms_of(problem, output, centred);
+	double rms = rms_of(problem, output, centred);
+	if (rms < 1e-6 * rms_of(problem, output, moved)) /* an offset */
+		rms = rms_of(problem, output, moved);
 	char ratio[64];
 	snprintf(ratio, sizeof ratio, "%.2g times the noise, %.2g %% of its range", rms / problem.noise.spread[output],
 			 100 * rms * problem.scale[output] / problem.range[output]);

@@ -106,7 +106,7 @@ std::vector<double> steps_of(const Problem &problem, const Hypothesis &h, const 
 		column_of(problem, h, y, part, parameter, info.neutral + step, large) && parallel(small, large, 0.99999))
 		return {info.neutral + step};
 	std::vector<double> values;
-	for (const double times : {0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0})
+	for (const double times : {1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0, 2.0, 4.0, 10.0, 30.0})
 		for (const double sign : {1.0, -1.0})
 			add_within(values, info, info.neutral + sign * times * step);
 	return values;

@@ -39,21 +39,41 @@ static int ascending(const void *a, const void *b)
 /* The step that all values are whole multiples of; 0 if there is none, or so many steps that it is no coarse one. */
 static double lattice(double *values, size_t n)
 {
-	double step = INFINITY, largest = 0;
+	double largest = 0;
+	size_t codes = 0;
 	qsort(values, n, sizeof *values, ascending);
 	for (size_t i = 0; i < n; i++)
 		largest = fmax(largest, fabs(values[i]));
-	for (size_t i = 1; i < n; i++)
-		if (values[i] - values[i - 1] > 1e-9 * largest)
-			step = fmin(step, values[i] - values[i - 1]);
-	double steps = round(largest / step);
-	if (!(steps >= 2) || steps > 5e4)
-		return 0;
-	step = largest / steps;
 	for (size_t i = 0; i < n; i++)
-		if (fabs(values[i] / step - round(values[i] / step)) > 0.02)
+		if (i == 0 || values[i] - values[codes - 1] > 1e-9 * largest)
+			values[codes++] = values[i];
+	if (codes < 3 || codes > n / 3)
+		return 0;
+	double gaps[64],
+		step; /* of codes spread evenly over all: their lower quartile is one step, unless codes are rare */
+	size_t count = codes - 1 < 64 ? codes - 1 : 64;
+	for (size_t k = 0; k < count; k++) {
+		size_t i = 1 + k * (codes - 1) / count;
+		gaps[k] = values[i] - values[i - 1];
+	}
+	qsort(gaps, count, sizeof *gaps, ascending);
+	step = gaps[count / 4];
+	/* The step that the codes are nearest to whole multiples of; a real converter's are not quite even. */
+	double off = 0;
+	for (int pass = 0; pass < 20; pass++) {
+		double product = 0, square = 0;
+		off = 0;
+		for (size_t i = 0; i < codes; i++) {
+			double whole = round(values[i] / step);
+			product += whole * values[i];
+			square += whole * whole;
+			off += pow(values[i] / step - whole, 2);
+		}
+		if (!(square > 0))
 			return 0;
-	return step;
+		step = product / square;
+	}
+	return sqrt(off / (double)codes) < 0.2 ? step : 0;
 }
 
 static size_t propose(const tactus_series *series, size_t parameter, double *values, size_t most)
