@@ -45,9 +45,8 @@ setup_file() {
 # of the pictures, texts that leave their picture, what was requested, numbers with their place in the JSON.
 measure() {
 	cat >frame.html <<-EOF
-		<body style="margin:0"><iframe id="f" src="file://$BATS_FILE_TMPDIR/$1/index.html" style="width:$2px;height:900px;border:0"></iframe>
 		<script>
-		document.getElementById("f").onload = event => {
+		const measure = event => {
 			const w = event.target.contentWindow, d = w.document;
 			d.querySelectorAll("details").forEach(e => e.open = true);
 			const box = e => { const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; };
@@ -70,6 +69,7 @@ measure() {
 				channels: d.querySelectorAll("section").length}) + "END";
 		};
 		</script>
+		<body style="margin:0"><iframe onload="measure(event)" src="file://$BATS_FILE_TMPDIR/$1/index.html" style="width:$2px;height:900px;border:0"></iframe>
 	EOF
 	browser --window-size=1400,1000 --virtual-time-budget=10000 --dump-dom "file://$PWD/frame.html" |
 		tr '\n' ' ' | sed -n 's/.*RESULT\(.*\)END<.*/\1/p' | sed 's/&lt;/</g; s/&gt;/>/g; s/&amp;/\&/g' >measured.json
@@ -154,8 +154,8 @@ measure() {
 	page=file://$BATS_FILE_TMPDIR/one/index.html
 	browser --window-size=500,3000 --screenshot=shot.png "$page"
 	cat >count.html <<-EOF
-		<body><img id="i" src="file://$PWD/shot.png"><script>
-		document.getElementById("i").onload = event => {
+		<script>
+		const count = event => {
 			const i = event.target, c = document.createElement("canvas");
 			c.width = i.naturalWidth;
 			c.height = i.naturalHeight;
@@ -171,6 +171,7 @@ measure() {
 			document.body.textContent = "PIXELS " + [near(0xc2, 0x50, 0x0a), near(0, 0x68, 0xa8), near(0x1a, 0x1d, 0x21)].join(" ") + " .";
 		};
 		</script>
+		<body><img onload="count(event)" src="file://$PWD/shot.png">
 	EOF
 	read -r before after ink < <(browser --virtual-time-budget=10000 --dump-dom "file://$PWD/count.html" |
 		sed -n 's/.*PIXELS \([0-9 ]*\) \..*/\1/p')
