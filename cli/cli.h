@@ -155,5 +155,9 @@ void cli_output_abort(struct cli_output *output);
 /* A run over a recording, block by block: read, process, write, flush when no more input waits. Returns a status. */
 typedef int (*cli_block_function)(void *context, tactus_table *block); /* 0 or a tactus_error */
 int cli_stream(const struct cli *cli, tactus_reader *reader, cli_block_function process, void *context);
+/* The same, for what depends on later rows: says how many at the end of a block have to wait for more. */
+typedef size_t (*cli_wait_function)(void *context, tactus_table *block);
+int cli_stream_waiting(const struct cli *cli, tactus_reader *reader, cli_block_function process, cli_wait_function wait,
+					   void *context);
 
 #endif

@@ -6,6 +6,12 @@ static int estimate(void *context, tactus_table *block)
 	return tactus_estimator_block(context, block);
 }
 
+/* Channels that feel each other are solved jointly: a scan is not cut where a block ends. */
+static size_t incomplete(void *context, tactus_table *block)
+{
+	return tactus_estimator_incomplete(context, block);
+}
+
 static int apply(const struct cli *cli, tactus_reader *reader, const tactus_model *model)
 {
 	char fingerprint[17];
@@ -16,7 +22,7 @@ static int apply(const struct cli *cli, tactus_reader *reader, const tactus_mode
 		error = tactus_estimator_new(model, &estimator);
 	if (error)
 		return cli_fail(cli, error);
-	int status = cli_stream(cli, reader, estimate, estimator);
+	int status = cli_stream_waiting(cli, reader, estimate, incomplete, estimator);
 	tactus_estimator_free(estimator);
 	return status;
 }
@@ -62,7 +68,9 @@ const struct cli_command cli_force = {
 		"fingerprint.\n\n"
 		"quality is ok, or the reasons why the row is not to be trusted, joined by +: extrapolated where the reading "
 		"or the force lies outside the calibrated range, uncalibrated for a channel that the model does not have, "
-		"dead-zone, saturated, noise-amplified, and those that the reading already had.",
+		"dead-zone, saturated, noise-amplified, approximate where a model has both a time offset and mechanical "
+		"crosstalk (a neighbour's load is then of another instant: right as long as loads hold still), and those that "
+		"the reading already had.",
 	.examples = "tactus force -m model.toml run.csv -o newtons.csv  # a recording\n"
 				"tactus scan sim: | tactus force -m model.toml | head -5  # live\n",
 	.options = options,

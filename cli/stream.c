@@ -6,11 +6,14 @@
 #include "internal.h"
 
 /* Reads, processes and writes until the end or a signal; 0 or a tactus_error. */
-static int pump(tactus_reader *reader, tactus_writer *writer, cli_block_function process, void *context)
+static int pump(tactus_reader *reader, tactus_writer *writer, cli_block_function process, cli_wait_function wait,
+				void *context)
 {
-	bool written = false;
+	bool written = false, held = false;
 	/* A terminal sends SIGINT to a whole pipeline: what the stages before us have written by then is still read. */
-	while (!cli_signal || (cli_signal == SIGINT && tactus_reader_ready(reader))) {
+	while (!cli_signal || held || (cli_signal == SIGINT && tactus_reader_ready(reader))) {
+		if (cli_signal && held)
+			tactus_reader_hold(reader, 0); /* what waited comes out as it is */
 		tactus_table *block;
 		long rows = tactus_reader_next(reader, 0, &block);
 		if (rows == TACTUS_ERR_INTERRUPTED)
@@ -21,6 +24,10 @@ static int pump(tactus_reader *reader, tactus_writer *writer, cli_block_function
 			return 0;
 		if (rows == 0)
 			block = tactus_reader_block(reader); /* a recording without rows still has its header */
+		size_t waiting = wait && rows > 0 && !cli_signal ? wait(context, block) : 0;
+		held = waiting > 0 && tactus_reader_hold(reader, waiting);
+		if (held && tactus_table_rows(block) == 0)
+			continue;
 		int error = process(context, block);
 		if (!error)
 			error = tactus_writer_rows(writer, block);
@@ -44,12 +51,18 @@ static bool reads_file(const struct cli *cli)
 
 int cli_stream(const struct cli *cli, tactus_reader *reader, cli_block_function process, void *context)
 {
+	return cli_stream_waiting(cli, reader, process, NULL, context);
+}
+
+int cli_stream_waiting(const struct cli *cli, tactus_reader *reader, cli_block_function process, cli_wait_function wait,
+					   void *context)
+{
 	tactus_writer *writer;
 	cli_catch_signals();
 	int error = cli_open_writer(cli, &writer);
 	if (error)
 		return cli_fail(cli, error);
-	error = pump(reader, writer, process, context);
+	error = pump(reader, writer, process, wait, context);
 	if (error || (cli_signal && reads_file(cli))) {
 		int status = cli_fail(cli, error); /* before the message is lost */
 		tactus_writer_abort(writer);

@@ -173,12 +173,20 @@ TACTUS_API void tactus_estimator_reset(tactus_estimator *estimator);
 TACTUS_API int tactus_estimator_sample(tactus_estimator *estimator, const tactus_sample *sample, tactus_force *force);
 /**
  * Adds force_estimate_N, force_estimate_std_N and quality to every row of a block (and force_estimate_time_s where the
- * model has a time offset). Any blocking gives the same bits, but where channels are coupled: the rows of one sequence
- * are solved jointly as far as they are in one block, a neighbour's load that is not counts as last estimated. Where
- * dc and ac rows of a scan are one model's, the second combines both by inverse variance. An empty force says why in
+ * model has a time offset; neighbours are not moved by it, so that a coupled channel's force is then "approximate"
+ * while loads change). Any blocking gives the same bits, but where channels are coupled: the rows of one scan (one
+ * sequence, at most up to the channel and mode that the scan before ended with) are solved jointly as far as they are
+ * in one block, a neighbour's load that is not counts as last estimated; see tactus_estimator_incomplete(). Where dc
+ * and ac rows of a scan are one model's, the second combines both by inverse variance. An empty force says why in
  * quality, or its row is of a mode that was not calibrated. TACTUS_ERR_INPUT if no reading of the model is there.
  */
 TACTUS_API int tactus_estimator_block(tactus_estimator *estimator, tactus_table *block);
+/**
+ * How many rows at the end of a block belong to a scan of coupled channels that may not be complete yet: keep them back
+ * until more has come, and any blocking gives the same bits. A scan is complete when another one follows or when it has
+ * come as far as the one before. 0 where channels are not coupled.
+ */
+TACTUS_API size_t tactus_estimator_incomplete(tactus_estimator *estimator, tactus_table *block);
 
 #ifdef __cplusplus
 }

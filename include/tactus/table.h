@@ -115,6 +115,13 @@ TACTUS_API tactus_table *tactus_reader_block(tactus_reader *reader);
 /** True if the next call of tactus_reader_next() may return without waiting for input: then do not flush yet. */
 TACTUS_API bool tactus_reader_ready(tactus_reader *reader);
 
+/**
+ * Gives the last rows of the block back, right after tactus_reader_next(): the next block begins with them and waits
+ * for more (a wide line goes back whole). False, and nothing is given back, if no more can come or if they are a block
+ * full. 0 rows: the next block does not wait for more than what was given back.
+ */
+TACTUS_API bool tactus_reader_hold(tactus_reader *reader, size_t rows);
+
 /** A whole recording at once; the caller frees the table. TACTUS_ERR_DATA if it has a header and no rows. */
 TACTUS_API int tactus_table_read(const char *path, const tactus_read_options *options, tactus_table **table);
 

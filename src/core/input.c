@@ -123,19 +123,32 @@ static int read_more(struct tactus_input *input)
 int tactus_input_fill(struct tactus_input *input)
 {
 	int found = 0;
-	while (input->complete <= input->begin && !input->at_end && found == 0) {
+	while (input->complete <= input->begin + input->held && !input->at_end && found == 0) {
 		found = make_room(input);
 		if (found == TACTUS_OK)
 			found = wait_for_bytes(input);
 		if (found == TACTUS_OK)
 			found = read_more(input);
 	}
+	if (found >= 0)
+		input->held = 0;
 	return found < 0 ? found : input->complete > input->begin;
+}
+
+void tactus_input_hold(struct tactus_input *input, size_t line)
+{
+	while (input->line > line) {
+		const char *end = input->buffer + input->begin - 1; /* of the line before */
+		const char *newline = memrchr(input->buffer, '\n', (size_t)(end - input->buffer));
+		input->begin = newline ? (size_t)(newline - input->buffer) + 1 : 0;
+		input->line--;
+	}
+	input->held = input->complete - input->begin;
 }
 
 bool tactus_input_ready(struct tactus_input *input)
 {
-	while (input->complete <= input->begin && !input->at_end) {
+	while (input->complete <= input->begin + input->held && !input->at_end) {
 		if (!readable(input))
 			return false;
 		if (input->end == input->size || read_more(input) < 0)

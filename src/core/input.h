@@ -16,6 +16,7 @@ struct tactus_input {
 	char *buffer;
 	size_t size, begin, end; /* unread bytes are [begin, end) */
 	size_t complete;         /* unread whole lines are [begin, complete); each ends with '\n' */
+	size_t held;             /* bytes from begin that are not enough: the next fill waits for more */
 	size_t line;             /* number of the line at begin, from 1 */
 	bool at_end;             /* nothing more comes after end */
 	bool cut;                /* the last line had no line end of its own */
@@ -30,6 +31,8 @@ void tactus_input_close(struct tactus_input *input);
 int tactus_input_fill(struct tactus_input *input);
 /* True if tactus_input_fill() would not wait. Reads what is there, but moves nothing. */
 bool tactus_input_ready(struct tactus_input *input);
+/* Goes back to the start of an earlier line of this buffer, and waits for more than what is there now. */
+void tactus_input_hold(struct tactus_input *input, size_t line);
 /* Fails with FILE:LINE: of the line at begin. */
 int tactus_input_fail(const struct tactus_input *input, const char *format, ...) __attribute__((format(printf, 2, 3)));
 

@@ -78,6 +78,24 @@ bool tactus_reader_ready(tactus_reader *reader)
 	return tactus_input_ready(&reader->input);
 }
 
+bool tactus_reader_hold(tactus_reader *reader, size_t rows)
+{
+	tactus_table *table = reader->table;
+	struct tactus_input *input = &reader->input;
+	if (rows == 0)
+		input->held = 0;
+	bool more = !input->at_end || input->begin < input->complete;
+	if (rows == 0 || rows > table->rows || !more || (rows == table->rows && rows >= BLOCK_ROWS))
+		return false;
+	size_t kept = table->rows - rows, line = table->lines[kept];
+	while (kept > 0 && table->lines[kept - 1] == line)
+		kept--; /* a wide line goes back whole */
+	tactus_input_hold(input, line);
+	reader->line_row = 0;
+	table->rows = kept;
+	return true;
+}
+
 long tactus_reader_next(tactus_reader *reader, size_t max_rows, tactus_table **block)
 {
 	if (max_rows == 0)

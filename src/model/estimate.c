@@ -117,6 +117,7 @@ static void forget_scan(tactus_estimator_channel *channel)
 
 void tactus_estimator_reset(tactus_estimator *estimator)
 {
+	estimator->end_channel = NAN;
 	for (size_t c = 0; c < estimator->model->channel_count; c++) {
 		tactus_estimator_channel *channel = &estimator->channels[c];
 		if (channel->inverse != NULL)
@@ -215,6 +216,9 @@ static void invert(const tactus_estimator *estimator, tactus_estimator_channel *
 	if (!isnan(result.memory))
 		channel->latest[row->mode] = result.memory;
 	force->quality |= result.quality;
+	/* A force belongs to the instant Δ before its reading; the neighbours that press on it now were then otherwise. */
+	if (channel->offset_s != 0 && tactus_inverse_coupled(channel->inverse))
+		force->quality |= TACTUS_QUALITY_APPROXIMATE;
 	force->force_N = result.force;
 	force->force_std_N = result.std;
 }

@@ -41,6 +41,9 @@ struct tactus_estimator {
 	bool halves;                     /* two readings, in rows of different modes */
 	tactus_estimator_channel *channels;
 	size_t last; /* channel of the row before */
+	/* How the scan before ended: the next is complete when it has come so far. channel NaN: there was none. */
+	double end_channel;
+	enum tactus_row_mode end_mode;
 	/* Room for a block. */
 	size_t capacity;
 	unsigned *quality;

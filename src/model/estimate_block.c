@@ -72,6 +72,13 @@ static int keep_quality(tactus_estimator *estimator, const tactus_table *block)
 
 /* ---- rows ---- */
 
+static enum tactus_row_mode row_mode(const tactus_columns *columns, size_t r)
+{
+	if (columns->mode == NULL || columns->mode[r].length == 0)
+		return TACTUS_ROW_ANY;
+	return tactus_columns_has_mode(columns, r, "dc") ? TACTUS_ROW_DC : TACTUS_ROW_AC;
+}
+
 static int read_row(const tactus_estimator *estimator, size_t r, tactus_estimator_row *row)
 {
 	const tactus_columns *columns = &estimator->columns;
@@ -84,9 +91,7 @@ static int read_row(const tactus_estimator *estimator, size_t r, tactus_estimato
 	}
 	row->sequence = columns->sequence != NULL ? columns->sequence[r] : NAN;
 	row->quality = estimator->quality[r];
-	row->mode = TACTUS_ROW_ANY;
-	if (columns->mode != NULL && columns->mode[r].length > 0)
-		row->mode = tactus_columns_has_mode(columns, r, "dc") ? TACTUS_ROW_DC : TACTUS_ROW_AC;
+	row->mode = row_mode(columns, r);
 	if (columns->channel != NULL && isnan(columns->channel[r])) {
 		row->channel = INT_MIN;
 		row->quality |= TACTUS_QUALITY_MISSING;
@@ -129,13 +134,50 @@ static void write_row(const tactus_estimator *estimator, const result_columns *t
 
 /* ---- scans ---- */
 
-/* The end of the scan that begins at a row: rows of one sequence, one after the other. */
-static size_t scan_end(const tactus_columns *columns, size_t first)
+/* True if a scan that ends with this row ends as the one before did. */
+static bool ends_scan(const tactus_estimator *estimator, size_t r)
 {
+	const tactus_columns *columns = &estimator->columns;
+	return columns->channel != NULL && columns->channel[r] == estimator->end_channel &&
+		   row_mode(columns, r) == estimator->end_mode;
+}
+
+/* The end of the scan that begins at a row: rows of one sequence, up to the one that the scan before ended with. */
+static size_t scan_end(const tactus_estimator *estimator, size_t first)
+{
+	const tactus_columns *columns = &estimator->columns;
 	size_t end = first + 1;
-	while (columns->sequence != NULL && end < columns->rows && columns->sequence[end] == columns->sequence[first])
+	while (columns->sequence != NULL && end < columns->rows && columns->sequence[end] == columns->sequence[first] &&
+		   !ends_scan(estimator, end - 1))
 		end++;
 	return end;
+}
+
+static void note_end(tactus_estimator *estimator, size_t end)
+{
+	const tactus_columns *columns = &estimator->columns;
+	estimator->end_channel = columns->channel != NULL ? columns->channel[end - 1] : NAN;
+	estimator->end_mode = row_mode(columns, end - 1);
+}
+
+size_t tactus_estimator_incomplete(tactus_estimator *estimator, tactus_table *block)
+{
+	tactus_columns *columns = &estimator->columns;
+	tactus_columns_find(block, columns);
+	if (!estimator->coupled || columns->sequence == NULL || columns->rows == 0)
+		return 0;
+	double channel = estimator->end_channel;
+	enum tactus_row_mode mode = estimator->end_mode;
+	size_t first = 0;
+	for (size_t end; first < columns->rows; first = end) {
+		end = scan_end(estimator, first);
+		if (end == columns->rows && !ends_scan(estimator, end - 1) && !isnan(columns->sequence[first]))
+			break;
+		note_end(estimator, end);
+	}
+	estimator->end_channel = channel;
+	estimator->end_mode = mode;
+	return columns->rows - first;
 }
 
 static int estimate_scan(tactus_estimator *estimator, size_t first, size_t end, const result_columns *to)
@@ -163,7 +205,9 @@ static int estimate_rows(tactus_estimator *estimator, const result_columns *to)
 	size_t rows = estimator->columns.rows;
 	int status = TACTUS_OK;
 	for (size_t r = 0, end; r < rows && status == TACTUS_OK; r = end) {
-		end = estimator->coupled ? scan_end(&estimator->columns, r) : r + 1;
+		end = estimator->coupled ? scan_end(estimator, r) : r + 1;
+		if (estimator->coupled)
+			note_end(estimator, end);
 		if (end > r + 1) {
 			status = estimate_scan(estimator, r, end, to);
 			continue;

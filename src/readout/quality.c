@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-enum { FLAGS = 10 };
+enum { FLAGS = 11 };
 
 /* Doubles the table per flag, the lowest bit innermost: the index is the flags, the words stand in the flags' order. */
 #define TEXT(words)                                                                                                    \
@@ -20,8 +20,9 @@ enum { FLAGS = 10 };
 #define FLAG7(rest) FLAG6(rest), FLAG6("+saturated" rest)
 #define FLAG8(rest) FLAG7(rest), FLAG7("+noise-amplified" rest)
 #define FLAG9(rest) FLAG8(rest), FLAG8("+uncalibrated" rest)
+#define FLAG10(rest) FLAG9(rest), FLAG9("+approximate" rest)
 
-static const tactus_text texts[1 << FLAGS] = {FLAG9("")};
+static const tactus_text texts[1 << FLAGS] = {FLAG10("")};
 
 tactus_text tactus_quality_name(unsigned flags)
 {

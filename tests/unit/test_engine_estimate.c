@@ -411,6 +411,34 @@ static void a_time_offset_moves_the_instant_of_the_force(void **unused)
 	tactus_model_free(model);
 }
 
+/* Neighbours are not moved: right where loads hold still, and said to be approximate everywhere. */
+static void a_time_offset_with_crosstalk_is_said_to_be_approximate(void **unused)
+{
+	(void)unused;
+	tactus_model *model = rig_model("G", 2);
+	tactus_table *table = rig_recording(30, 2, "");
+	rig_effect(model, &tactus_effect_sensor_time_offset, false);
+	rig_set(model, "time-offset", "offset_s", 0.25);
+	rig_effect(model, &tactus_effect_sensor_mechanical_crosstalk, false);
+	rig_set(model, "mechanical-crosstalk", "coupling_below", 0.2);
+	rig_set(model, "mechanical-crosstalk", "coupling_above", 0.2);
+	double *force = rig_column(table, "force_N");
+	for (size_t r = 0; r < 60; r++)
+		force[r] = r % 2 ? 30 : 70;
+	rig_simulate(model, 0, table);
+	rig_estimate(model, table);
+	for (size_t r = 0; r < 60; r++) {
+		rig_near(at(table, "force_estimate_N", r), r % 2 ? 30 : 70, 1e-9);
+		assert_true(rig_quality(table, r) & TACTUS_QUALITY_APPROXIMATE);
+	}
+	rig_set(model, "time-offset", "offset_s", 0);
+	tactus_table_remove(table, "quality");
+	rig_estimate(model, table);
+	assert_false(rig_quality(table, 20) & TACTUS_QUALITY_APPROXIMATE);
+	tactus_table_free(table);
+	tactus_model_free(model);
+}
+
 /* ---- what is refused ---- */
 
 static int try_block(const tactus_model *model, tactus_table *table)
@@ -480,6 +508,7 @@ int main(void)
 		cmocka_unit_test(a_pair_is_complete_in_its_second_row),
 		cmocka_unit_test(coupled_channels_are_solved_jointly),
 		cmocka_unit_test(a_time_offset_moves_the_instant_of_the_force),
+		cmocka_unit_test(a_time_offset_with_crosstalk_is_said_to_be_approximate),
 		cmocka_unit_test(what_is_missing_is_said),
 		cmocka_unit_test(a_readout_model_gives_no_force),
 	};
