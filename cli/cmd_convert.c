@@ -64,6 +64,9 @@ static const struct cli_option options[] = {
 	{"sample-scale", 0, CLI_QUANTITY, "V", "V", "volts at the amplifier's output per unit of a sample"},
 	{"drive-sampled", 0, CLI_FLAG, NULL, NULL, "int16, float32: every second sample is the drive's"},
 	{"drive-scale", 0, CLI_QUANTITY, "V", "V", "volts of the drive per unit of a sample of it"},
+	{"mode", 0, CLI_CHOICE, "MODE", "ac|dc|dc,ac|ac,dc",
+	 "waveform: readings of every channel (default: as scanned, or ac)"},
+	{"dc-drive", 0, CLI_QUANTITY, "V", "V", "waveform: drive of the dc readings, signed, where it is not sampled"},
 	{"drive-phase", 0, CLI_QUANTITY, "ANGLE", "rad", "phase of the drive's sine at the first sample (default 0)"},
 	{"channels", 0, CLI_STRING, "LIST", NULL, "channels in the order in which the samples visit them, e.g. 1-8"},
 	{"dwell", 0, CLI_QUANTITY, "TIME", "s", "time per channel and reading, settling included"},
@@ -97,6 +100,7 @@ const struct cli_command cli_convert = {
 		"drive_sample_V (the drive, sampled at the same instants), time_s and channel; or little-endian int16 or "
 		"float32 without a header. Each dwell, less its settle time, becomes one reading by least squares over a "
 		"cosine, a sine and an offset, so that it need not hold whole periods; its scatter gives the uncertainties. "
+		"A reading of mode dc (--mode, or the metadata's modes) is the signed mean instead. "
 		"The phase is that against the sampled drive or, without one, against a drive of --drive volts with "
 		"--drive-phase at the first sample. The inverting amplifier's sign is taken out.",
 	.examples = "tactus convert run.csv -o converted.csv  # R, G and C of a recording\n"

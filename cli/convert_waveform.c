@@ -47,6 +47,11 @@ static int settle_all(struct waveform *w, bool drive_sampled)
 		error = settle(w, "dwell", "dwell_s", &w->how.dwell_s);
 	if (!error)
 		error = settle(w, "settle", "settle_s", &w->how.settle_s);
+	if (!error)
+		error = settle(w, "dc-drive", "dc_drive_V", &w->how.dc_drive_V);
+	/* As the scan was made; what it does not say is ac. */
+	const char *modes = tactus_metadata_get(tactus_table_metadata(w->readings), "modes");
+	w->how.modes = cli_string(w->cli, "mode", modes ? modes : "ac");
 	w->how.drive_phase_rad = cli_quantity(w->cli, "drive-phase", 0);
 	w->how.drive_sampled = drive_sampled;
 	w->how.clip_V = cli_quantity(w->cli, "clip", w->how.clip_V);
@@ -64,9 +69,16 @@ static int begin(struct waveform *w)
 	tactus_convert_options options = cli_convert_options(w->cli);
 	int status = need(w, w->how.rate_Hz, "sample-rate", "the samples' rate");
 
-	if (!status)
+	bool ac = strstr(w->how.modes, "ac") != NULL, dc = strstr(w->how.modes, "dc") != NULL;
+
+	options.drive_V = options.frequency_Hz = NAN; /* every reading has its own */
+	if (!status && strchr(w->how.modes, ','))
+		status = need(w, w->how.dwell_s, "dwell", "the time per reading");
+	if (!status && dc && !w->how.drive_sampled)
+		status = need(w, w->how.dc_drive_V, "dc-drive", "the drive of the dc readings");
+	if (!status && ac)
 		status = need(w, w->how.frequency_Hz, "frequency", "the drive's frequency");
-	if (!status && !w->how.drive_sampled)
+	if (!status && ac && !w->how.drive_sampled)
 		status = need(w, w->how.drive_V, "drive", "the drive's voltage");
 	if (status)
 		return status;

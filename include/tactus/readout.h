@@ -162,13 +162,15 @@ typedef struct {
 	double drive_phase_rad; /**< drive = drive_V sin(2πft + drive_phase_rad), t = 0 at the first sample (eq. 2) */
 	const int *channels;    /**< order of the scan; copied; NULL: one channel, 1 */
 	size_t channel_count;
-	double dwell_s;  /**< per channel and reading, settling included; need not be whole samples or periods */
-	double settle_s; /**< discarded at the start of every dwell */
-	double clip_V;   /**< magnitude at or above which a sample is clipped; 0: not known */
-	double start_s;  /**< time of the first sample */
+	const char *modes; /**< "dc", "ac", "dc,ac" or "ac,dc": the readings of each channel, one dwell each; NULL: "ac" */
+	double dc_drive_V; /**< the drive of dc readings, signed, where it is not sampled */
+	double dwell_s;    /**< per channel and reading, settling included; need not be whole samples or periods */
+	double settle_s;   /**< discarded at the start of every dwell */
+	double clip_V;     /**< magnitude at or above which a sample is clipped; 0: not known */
+	double start_s;    /**< time of the first sample */
 } tactus_waveform;
 
-/** Zeros, with NaN for rate_Hz, frequency_Hz, drive_V and dwell_s, which must be stated. */
+/** Zeros, with NaN for rate_Hz, frequency_Hz, drive_V, dc_drive_V and dwell_s, which must be stated. */
 TACTUS_API tactus_waveform tactus_waveform_defaults(void);
 
 typedef struct tactus_demodulator tactus_demodulator;
@@ -180,7 +182,8 @@ TACTUS_API void tactus_demodulator_free(tactus_demodulator *demodulator);
  * Takes the next n samples (n may be 0) of the amplifier's output and, if it is sampled, of the drive, and replaces the
  * rows of `readings` by the readings that they complete: time_s (the middle of what was used), sequence, channel, mode,
  * drive_V, frequency_Hz, amplitude_V, phase_rad (of the admittance: the inverting amplifier's sign is taken out),
- * amplitude_std_V, phase_std_rad (from the scatter about the sine), quality; ready for tactus_converter_new(). A
+ * amplitude_std_V, phase_std_rad (from the scatter about the sine), quality; in dc the mean, signed, and its standard
+ * error; ready for tactus_converter_new(). A
  * channel per sample, if given (else NULL), overrides the schedule: a reading then also ends where it changes. A NaN
  * sample makes its reading `missing`. Blocks of any size give the same bits. Returns the number of readings.
  */

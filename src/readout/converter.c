@@ -365,7 +365,11 @@ static const double *filled(const double *column, double otherwise, size_t n, do
 static void convert_dc(const struct tactus_converter *c, const struct columns *in, size_t row, unsigned *quality)
 {
 	double drive = in->drive && !isnan(in->drive[row]) ? in->drive[row] : c->dc_drive_V;
-	tactus_impedance z = tactus_readout_dc(&c->readout, in->amplitude[row], drive);
+	tactus_readout readout = c->readout;
+
+	if (in->amplitude_std && !isnan(in->amplitude_std[row]))
+		readout.dc_std_V = in->amplitude_std[row];
+	tactus_impedance z = tactus_readout_dc(&readout, in->amplitude[row], drive);
 
 	in->out.resistance_ohm[row] = z.resistance_ohm;
 	in->out.conductance_S[row] = z.conductance_S;

@@ -14,6 +14,7 @@ enum { BLOCK = TACTUS_LOCKIN_BLOCK };
 struct reading {
 	double time_s, sequence, channel, drive_V, frequency_Hz, amplitude_V, phase_rad, amplitude_std_V, phase_std_rad;
 	unsigned quality;
+	bool dc;
 };
 
 /* One waveform's part of the slot. Samples wait until a block is full, so that blocks of any size give the same bits.
@@ -26,15 +27,17 @@ struct lane {
 struct tactus_demodulator {
 	tactus_waveform waveform;
 	int *channels; /* waveform.channels */
+	bool dc[2];    /* of the readings of a channel, in turn */
+	size_t mode_count;
 	struct tactus_lockin_reference reference;
 	struct lane output, drive;
 	size_t held;     /* samples in both lanes */
 	uint64_t settle; /* samples */
 	/* Samples are counted from the start of the stream. */
-	uint64_t at;             /* the next one */
-	uint64_t origin, slot;   /* slots are counted from the last change of a given channel */
-	uint64_t slot_end, used; /* where the slot ends, and the first of it that is used */
-	bool open, clipped;      /* of this slot */
+	uint64_t at;                /* the next one */
+	uint64_t origin, slot;      /* slots are counted from the last change of a given channel */
+	uint64_t slot_end, used;    /* where the slot ends, and the first of it that is used */
+	bool open, clipped, direct; /* of this slot; direct: dc */
 	double channel, first_channel;
 	uint64_t sequence;
 	struct reading *readings;
@@ -43,19 +46,35 @@ struct tactus_demodulator {
 
 tactus_waveform tactus_waveform_defaults(void)
 {
-	return (tactus_waveform){.rate_Hz = NAN, .frequency_Hz = NAN, .drive_V = NAN, .dwell_s = NAN};
+	return (tactus_waveform){.rate_Hz = NAN, .frequency_Hz = NAN, .drive_V = NAN, .dc_drive_V = NAN, .dwell_s = NAN};
+}
+
+static bool has_mode(const tactus_waveform *w, const char *mode)
+{
+	return strstr(w->modes ? w->modes : "ac", mode) != NULL;
 }
 
 static int check(const tactus_waveform *w)
 {
+	static const char *const known[] = {"dc", "ac", "dc,ac", "ac,dc"};
+	bool is_known = !w->modes;
+
+	for (size_t i = 0; i < TACTUS_COUNT(known); i++)
+		is_known = is_known || strcmp(w->modes, known[i]) == 0;
+	if (!is_known)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "the modes '%s' are none of dc, ac, dc,ac and ac,dc", w->modes);
+	if (w->modes && strchr(w->modes, ',') && isnan(w->dwell_s))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "where one reading of a channel ends is not known: dwell_s is needed");
+	if (has_mode(w, "dc") && !w->drive_sampled && (isnan(w->dc_drive_V) || w->dc_drive_V == 0))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "the drive of the dc readings is neither sampled nor known");
 	if (!(w->rate_Hz > 0))
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "the samples' rate is not known");
-	if (!(w->frequency_Hz > 0 && w->frequency_Hz < 0.5 * w->rate_Hz))
+	if (has_mode(w, "ac") && !(w->frequency_Hz > 0 && w->frequency_Hz < 0.5 * w->rate_Hz))
 		return tactus_fail(TACTUS_ERR_ARGUMENT,
 						   "the drive's frequency (%g Hz) must be above 0 and below half the samples' "
 						   "rate (%g Hz)",
 						   w->frequency_Hz, w->rate_Hz);
-	if (!w->drive_sampled && !(w->drive_V > 0))
+	if (has_mode(w, "ac") && !w->drive_sampled && !(w->drive_V > 0))
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "the drive is neither sampled nor is its voltage known");
 	if (!(w->settle_s >= 0))
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "the settle time (%g s) is below 0", w->settle_s);
@@ -82,11 +101,15 @@ int tactus_demodulator_new(const tactus_waveform *waveform, tactus_demodulator *
 	}
 	memcpy(d->channels, waveform->channels ? waveform->channels : alone, count * sizeof *d->channels);
 	d->waveform = *waveform;
+	for (const char *m = waveform->modes ? waveform->modes : "ac"; *m; m += m[2] ? 3 : 2)
+		d->dc[d->mode_count++] = *m == 'd';
+	d->waveform.modes = NULL; /* the caller's */
 	d->waveform.channels = d->channels;
 	d->waveform.channel_count = count;
 	d->settle = (uint64_t)ceil(waveform->settle_s * waveform->rate_Hz - 1e-6);
 	d->first_channel = NAN;
-	tactus_lockin_prepare(&d->reference, 2 * M_PI * waveform->frequency_Hz / waveform->rate_Hz, BLOCK);
+	tactus_lockin_prepare(&d->reference,
+						  has_mode(waveform, "ac") ? 2 * M_PI * waveform->frequency_Hz / waveform->rate_Hz : 0, BLOCK);
 	*demodulator = d;
 	return 0;
 }
@@ -108,10 +131,12 @@ static void begin_slot(struct tactus_demodulator *d, double given)
 	const tactus_waveform *w = &d->waveform;
 	bool whole = isnan(w->dwell_s);
 
-	d->channel = isnan(given) ? w->channels[d->slot % w->channel_count] : given;
+	size_t turn = d->slot % d->mode_count; /* counted from a change of channel, where channels are given */
+	d->channel = isnan(given) ? w->channels[d->slot / d->mode_count % w->channel_count] : given;
+	d->direct = d->dc[turn];
 	if (isnan(d->first_channel))
 		d->first_channel = d->channel;
-	else if (d->channel == d->first_channel)
+	else if (d->channel == d->first_channel && turn == 0)
 		d->sequence++;
 	d->slot++;
 	d->slot_end = whole ? UINT64_MAX : d->origin + (uint64_t)llround((double)d->slot * w->dwell_s * w->rate_Hz);
@@ -140,6 +165,28 @@ static struct tactus_lockin_result stated_drive(const struct tactus_demodulator 
 
 	return (struct tactus_lockin_result){.amplitude = w->drive_V,
 										 .phase_rad = 2 * M_PI * turns + w->drive_phase_rad - M_PI / 2};
+}
+
+/* The mean of the samples that were used, and its standard error if their scatter is white. */
+static double mean(const struct tactus_lockin_sums *sums, double *std)
+{
+	double n = (double)sums->n, about = sums->plain / n; /* of x − pivot */
+
+	*std = sums->n > 1 ? sqrt(fmax(0, sums->squares - n * about * about) / (n - 1) / n) : NAN;
+	return sums->n > 0 ? sums->pivot + about : NAN;
+}
+
+static void average(const struct tactus_demodulator *d, struct reading *reading)
+{
+	double drive_std = 0;
+
+	reading->amplitude_V = mean(&d->output.sums, &reading->amplitude_std_V);
+	reading->drive_V = d->waveform.drive_sampled ? mean(&d->drive.sums, &drive_std) : d->waveform.dc_drive_V;
+	if (isnan(reading->amplitude_V) || isnan(reading->drive_V))
+		reading->quality |= TACTUS_QUALITY_MISSING;
+	reading->amplitude_std_V = hypot(reading->amplitude_std_V, reading->amplitude_V * drive_std / reading->drive_V);
+	reading->phase_rad = reading->phase_std_rad = NAN;
+	reading->frequency_Hz = 0;
 }
 
 /* Vo = −Rg Y Vs: what the output is ahead of the drive, less the inversion's half turn, is the admittance's phase. */
@@ -184,7 +231,11 @@ static int end_slot(struct tactus_demodulator *d)
 								.drive_V = d->waveform.drive_sampled ? NAN : d->waveform.drive_V,
 								.frequency_Hz = d->waveform.frequency_Hz,
 								.quality = d->clipped ? TACTUS_QUALITY_CLIPPED : TACTUS_QUALITY_OK};
-	solve(d, reading);
+	reading->dc = d->direct;
+	if (d->direct)
+		average(d, reading);
+	else
+		solve(d, reading);
 	d->open = false;
 	return 0;
 }
@@ -287,7 +338,7 @@ static int put_mode(const struct tactus_demodulator *d, tactus_table *table)
 	tactus_text *mode = tactus_table_set_texts(table, "mode");
 
 	for (size_t i = 0; mode && i < d->count; i++)
-		mode[i] = (tactus_text){"ac", 2};
+		mode[i] = (tactus_text){d->readings[i].dc ? "dc" : "ac", 2};
 	return mode ? 0 : TACTUS_ERR_MEMORY;
 }
 

@@ -230,3 +230,23 @@ check_scan() { # FILE TOLERANCE
 	status_is 2
 	says --sample-rate
 }
+
+@test "waveform: the dc readings of a scan's plan become resistances too, and --mode says the plan where nothing does" {
+	samples() { # two channels of 2 and 4 kohm, 20 samples in dc at -5 V, 20 in ac at 3 V and 1 kHz
+		printf '# gain_resistor_ohm: 1000\n# sample_rate_Hz: 20000\n# frequency_Hz: 1000\n%s' "$1"
+		awk 'BEGIN { print "sample_V"; for (i = 0; i < 160; i++) { r = 2000 * (1 + int(i / 40) % 2)
+			printf "%.12g\n", int(i / 20) % 2 == 0 ? 5000 / r : -3000 / r * sin(2 * 3.14159265358979 * i / 20) } }'
+	}
+	samples $'# modes: dc,ac\n# dc_drive_V: -5\n# drive_V: 3\n' >plan.csv
+	run -0 --separate-stderr tactus convert plan.csv -w csv --channels 1-2 --dwell 1ms
+	[ "$(column mode <<<"$output" | tr '\n' ' ')" = "dc ac dc ac dc ac dc ac " ] || fail "modes"
+	[ "$(column resistance_ohm <<<"$output" | awk '{ printf "%.3f ", $1 }')" = \
+		"2000.000 2000.000 4000.000 4000.000 2000.000 2000.000 4000.000 4000.000 " ] || fail "resistances"
+	samples '' >none.csv
+	run -0 --separate-stderr tactus convert none.csv -w csv --channels 1-2 --dwell 1ms --mode dc,ac --dc-drive=-5V --drive 3V
+	[ "$(column resistance_ohm <<<"$output" | awk '{ printf "%.3f ", $1 }' | cut -c1-18)" = "2000.000 2000.000 " ] || fail "stated"
+	run -2 --separate-stderr tactus convert none.csv -w csv --mode dc
+	says --dc-drive
+	run -2 --separate-stderr tactus convert plan.csv -w csv
+	says --dwell
+}

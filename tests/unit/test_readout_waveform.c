@@ -270,6 +270,69 @@ static void lost_and_clipped_samples_flag_their_reading_only(void **state)
 	free(scan);
 }
 
+/* Each channel in dc, then in ac: Vo = −Rg Vs/R, signed, after a transient; the drive sampled or stated. */
+static void dc_readings_are_the_signed_mean_of_the_settled_samples(void **state)
+{
+	(void)state;
+	enum { DWELL = 400, SLOTS = 2 * 2 * CHANNELS, TOTAL = DWELL * SLOTS };
+	static double output[TOTAL], drive[TOTAL], given[TOTAL];
+	const double dc_drive = -5, noise = 1e-3;
+	uint64_t seed = 3;
+
+	for (int i = 0; i < TOTAL; i++) {
+		int slot = i / DWELL, c = slot / 2 % CHANNELS;
+		double w = 2 * M_PI * frequency * i / rate + drive_phase;
+		double complex y = 1 / resistance[c] + I * (2 * M_PI * frequency * capacitance[c]);
+		bool dc = slot % 2 == 0;
+		drive[i] = dc ? dc_drive : drive_peak * sin(w);
+		output[i] =
+			dc ? -gain_resistor * dc_drive / resistance[c] : -gain_resistor * drive_peak * cabs(y) * sin(w + carg(y));
+		output[i] += (i % DWELL < 200 ? 1 : 0) + noise * rig_normal(&seed);
+		given[i] = channels[c];
+	}
+	for (int variant = 0; variant < 3; variant++) { /* drive sampled; stated; channels given beside */
+		tactus_waveform w = how(DWELL / rate, 200 / rate);
+		w.modes = "dc,ac";
+		w.drive_sampled = variant == 0;
+		w.drive_V = drive_peak;
+		w.drive_phase_rad = drive_phase;
+		w.dc_drive_V = dc_drive;
+		tactus_demodulator *demodulator;
+		tactus_table *table = tactus_table_new();
+		assert_int_equal(tactus_demodulator_new(&w, &demodulator), 0);
+		assert_int_equal(tactus_demodulator_add(demodulator, TOTAL, output, variant == 0 ? drive : NULL,
+												variant == 2 ? given : NULL, table),
+						 SLOTS);
+		for (size_t r = 0; r < SLOTS; r++) {
+			int c = (int)r / 2 % CHANNELS;
+			bool dc = r % 2 == 0;
+			const double *amplitude = tactus_table_numbers(table, "amplitude_V");
+			const double *std = tactus_table_numbers(table, "amplitude_std_V");
+			rig_text(tactus_table_texts(table, "mode")[r], dc ? "dc" : "ac");
+			assert_true(tactus_table_numbers(table, "channel")[r] == channels[c]);
+			assert_true(tactus_table_numbers(table, "sequence")[r] == (double)(r / (2 * CHANNELS)));
+			assert_true(tactus_table_numbers(table, "frequency_Hz")[r] == (dc ? 0 : frequency));
+			rig_near(tactus_table_numbers(table, "drive_V")[r], dc ? dc_drive : drive_peak, 1e-9);
+			assert_true(isnan(tactus_table_numbers(table, "phase_rad")[r]) == dc);
+			if (!dc)
+				continue;
+			/* 200 settled samples: σ/√200, five of them */
+			double expected = -gain_resistor * dc_drive / resistance[c];
+			rig_near(amplitude[r], expected, 5 * noise / sqrt(200) / expected);
+			rig_near(std[r], noise / sqrt(200), 0.2); /* 1/√398 of it, four of them */
+		}
+		tactus_demodulator_free(demodulator);
+		tactus_table_free(table);
+	}
+	tactus_demodulator *none;
+	tactus_waveform w = how(DWELL / rate, 0);
+	w.modes = "dc,dc";
+	assert_int_equal(tactus_demodulator_new(&w, &none), TACTUS_ERR_ARGUMENT);
+	w.modes = "dc";
+	w.drive_sampled = false;
+	assert_int_equal(tactus_demodulator_new(&w, &none), TACTUS_ERR_ARGUMENT); /* of unknown drive */
+}
+
 static void settings_that_cannot_work_are_refused(void **state)
 {
 	tactus_demodulator *demodulator;
@@ -305,6 +368,7 @@ int main(void)
 		cmocka_unit_test(a_channel_column_overrides_the_schedule),
 		cmocka_unit_test(the_scatter_gives_the_uncertainty),
 		cmocka_unit_test(lost_and_clipped_samples_flag_their_reading_only),
+		cmocka_unit_test(dc_readings_are_the_signed_mean_of_the_settled_samples),
 		cmocka_unit_test(settings_that_cannot_work_are_refused),
 	};
 
