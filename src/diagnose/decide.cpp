@@ -9,7 +9,7 @@
 namespace tactus::explain
 {
 
-const Limits limits;
+const Limits limits = {};
 
 namespace
 {
@@ -229,13 +229,13 @@ class Decider
 		return effect->testable(problem.segments.front()) == nullptr;
 	}
 	std::vector<Scored> screen(const Fit &fit, bool all) const;
-	Fit best_next(const Fit &fit, const tactus_effect **effect, bool standing) const;
+	Fit best_next(const Fit &fit, const tactus_effect **effect) const;
 	bool stands(const Fit &with, const Fit &without, double removed) const;
 	Fit without(const Fit &fit, const tactus_effect *effect) const;
 	void select();
 	void prune();
-	void exchange();
-	void find_rivals();
+	bool challenge(Cause &cause);
+	void settle();
 	void adequacy();
 	void staleness();
 	bool needless(const Group &group) const;
@@ -262,14 +262,15 @@ std::vector<Scored> Decider::screen(const Fit &fit, bool all) const
 	return scored;
 }
 
-/* The best of the few that look best, fitted jointly. */
-Fit Decider::best_next(const Fit &fit, const tactus_effect **effect, bool standing) const
+/* The best of those that stand among the few that look best, fitted jointly. */
+Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 {
 	Fit best;
 	*effect = nullptr;
 	size_t tried = 0;
 	for (const Scored &s : screen(fit, false)) {
-		if (tried == limits.tried || !(s.cost < 0) || s.part.free.empty())
+		if (tried == limits.tried || !(s.cost < -0.5 * limits.evidence) || s.part.free.empty() ||
+			(best.ok && s.cost > limits.hopeless * merit(best, fit)))
 			break;
 		tried++;
 		const Fit joined = join(problem, fit, s.part);
@@ -277,7 +278,7 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect, bool standi
 		fprintf(stderr, "  try %s linear %.1f joint %.1f ok %d\n", s.part.effect->name, s.cost,
 				joined.ok ? joined.cost - fit.cost : NAN, joined.ok);
 #endif
-		if (joined.ok && (!standing || stands(joined, fit, d.base.square - fit.square)) &&
+		if (joined.ok && stands(joined, fit, d.base.square - fit.square) &&
 			(!best.ok || merit(joined, fit) < merit(best, fit))) {
 			best = joined;
 			*effect = s.part.effect;
@@ -288,7 +289,8 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect, bool standi
 
 bool Decider::stands(const Fit &with, const Fit &without, double removed) const
 {
-	const double gain = without.square - with.square;
+	const double gain = (without.square - with.square) *
+						std::fmax(1 - limits.parameter_share * (with.parameters - without.parameters), 0.1);
 	/* A jump shows at its instant: the block that holds it cannot be foretold from the others. */
 	const auto instants = std::count_if(with.slots.begin(), with.slots.end(), [&](const Slot &slot) {
 		return slot.part >= 0 && !without.hypothesis.has(with.hypothesis.parts[size_t(slot.part)].effect) &&
@@ -319,7 +321,7 @@ void Decider::select()
 	d.final = d.base;
 	while (d.causes.size() < limits.causes) {
 		const tactus_effect *effect;
-		const Fit next = best_next(d.final, &effect, true);
+		const Fit next = best_next(d.final, &effect);
 		if (!effect)
 			return;
 		d.final = next;
@@ -327,76 +329,95 @@ void Decider::select()
 	}
 }
 
-/* A cause that the later ones made needless goes. */
+/* A cause that the later ones made needless goes; the others know what is left without them. */
 void Decider::prune()
 {
-	for (bool again = true; again && d.causes.size() > 1;) {
+	for (bool again = true; again;) {
 		again = false;
-		for (size_t i = 0; i < d.causes.size(); i++) {
-			const Fit left = without(d.final, d.causes[i].effect);
-			if (!left.ok || stands(d.final, left, d.base.square - left.square))
+		for (size_t i = 0; i < d.causes.size() && !again; i++) {
+			d.causes[i].without = d.causes.size() > 1 ? without(d.final, d.causes[i].effect) : d.base;
+			const Fit &left = d.causes[i].without;
+			if (d.causes.size() < 2 || !left.ok || stands(d.final, left, d.base.square - left.square))
 				continue;
-			d.final = left;
+			d.final = Fit(left);
 			d.causes.erase(d.causes.begin() + long(i));
 			again = true;
-			break;
 		}
 	}
 }
 
-/* Each cause in turn gives way to whatever does better in its place: the first one was chosen without the others. */
-void Decider::exchange()
+/*
+ * What else would do in a cause's place. A testable one that does clearly better takes it (the first was chosen without
+ * the others): true. Otherwise they are its rivals.
+ */
+bool Decider::challenge(Cause &cause)
 {
-	for (size_t i = 0; d.causes.size() > 1 && i < d.causes.size(); i++) {
-		const Fit left = without(d.final, d.causes[i].effect);
-		if (!left.ok)
+	const Fit &left = cause.without;
+	const double mine = merit(d.final, left);
+	const std::vector<double> ours = problem.held_out(d.final);
+	cause.rivals.clear();
+	size_t tried = 0;
+	Fit better;
+	const tactus_effect *effect = nullptr;
+	for (const Scored &s : screen(left, true)) {
+		if (s.part.effect == cause.effect || d.final.hypothesis.has(s.part.effect))
 			continue;
-		const tactus_effect *effect;
-		const Fit other = best_next(left, &effect, false);
-		if (effect && effect != d.causes[i].effect && merit(other, left) < merit(d.final, left) - limits.margin) {
-			d.final = other;
-			d.causes[i].effect = effect;
+		if (tried == limits.tried || s.part.free.empty() || !(s.cost < limits.hopeless * mine))
+			break;
+		tried++;
+		const Fit other = join(problem, left, s.part);
+		if (!other.ok)
+			continue;
+		const double t = paired(problem, problem.held_out(other), ours), theirs = merit(other, left);
+		const bool apart = theirs - mine > std::fmax(limits.margin, -limits.relative_margin * mine) &&
+						   (t > limits.paired || (t > 0 && theirs > limits.far * mine));
+#ifdef EXPLAIN_TRACE
+		fprintf(stderr, "  rival of %s: %s merit %.1f against %.1f paired %.2f\n", cause.effect->name,
+				s.part.effect->name, theirs, mine, t);
+#endif
+		if (testable(s.part.effect) && theirs < mine - limits.margin && (!better.ok || theirs < merit(better, left))) {
+			better = other;
+			effect = s.part.effect;
 		}
+		cause.rivals.push_back({s.part.effect, s.part.effect->name, other.cost - left.cost, testable(s.part.effect),
+								!apart, other.hypothesis});
 	}
+	if (better.ok) {
+		d.final = better;
+		cause.effect = effect;
+		return true;
+	}
+	std::sort(cause.rivals.begin(), cause.rivals.end(), [](const Rival &a, const Rival &b) {
+		return a.inseparable != b.inseparable ? a.inseparable : a.delta < b.delta;
+	});
+	const tactus_effect *e = cause.effect;
+	if (e->twin && !(e->twin_excluded && e->twin_excluded(problem.segments.front(), evidence.metadata)))
+		cause.rivals.insert(cause.rivals.begin(), {nullptr, e->twin, d.final.cost - left.cost, false, true, {}});
+	return false;
 }
 
-void Decider::find_rivals()
+void Decider::settle()
 {
-	for (Cause &cause : d.causes) {
-		cause.without = without(d.final, cause.effect);
-		cause.delta = d.final.cost - cause.without.cost;
-		const double k = double(d.final.slots.size() - std::min(d.final.slots.size(), cause.without.slots.size()));
-		cause.p_value = f_test(cause.without.square - d.final.square, d.final.square, std::fmax(k, 1),
-							   double(problem.training) - double(d.final.slots.size()));
-		const std::vector<double> ours = problem.held_out(d.final);
-		size_t tried = 0;
-		for (const Scored &s : screen(cause.without, true)) {
-			if (s.part.effect == cause.effect || d.final.hypothesis.has(s.part.effect))
-				continue;
-			if (tried == limits.tried || s.part.free.empty() || !(s.cost < 0.3 * cause.delta))
-				break;
-			tried++;
-			const Fit other = join(problem, cause.without, s.part);
-			if (!other.ok)
-				continue;
-			const double t = paired(problem, problem.held_out(other), ours);
-			const double theirs = merit(other, cause.without), mine = merit(d.final, cause.without);
-			const bool margin = theirs - mine > limits.margin && (t > limits.paired || (t > 0 && theirs > 0.8 * mine));
-#ifdef EXPLAIN_TRACE
-			fprintf(stderr, "  rival of %s: %s merit %.1f against %.1f paired %.2f\n", cause.effect->name,
-					s.part.effect->name, merit(other, cause.without), merit(d.final, cause.without), t);
-#endif
-			cause.rivals.push_back({s.part.effect, s.part.effect->name, other.cost - cause.without.cost,
-									testable(s.part.effect), !margin});
-		}
-		std::sort(cause.rivals.begin(), cause.rivals.end(), [](const Rival &a, const Rival &b) {
-			return a.inseparable != b.inseparable ? a.inseparable : a.delta < b.delta;
-		});
-		const tactus_effect *e = cause.effect;
-		if (e->twin && !(e->twin_excluded && e->twin_excluded(problem.segments.front(), evidence.metadata)))
-			cause.rivals.insert(cause.rivals.begin(), {nullptr, e->twin, cause.delta, false, true});
+	for (int round = 0; round < 3; round++) {
+		prune();
+		bool changed = false;
+		for (size_t i = 0; i < d.causes.size() && !changed; i++)
+			changed = challenge(d.causes[i]);
+		if (!changed)
+			break;
 	}
-	std::sort(d.causes.begin(), d.causes.end(), [](const Cause &a, const Cause &b) { return a.delta < b.delta; });
+	for (Cause &cause : d.causes) {
+		cause.delta = d.final.cost - cause.without.cost;
+		cause.p_value = f_test(cause.without.square - d.final.square, d.final.square,
+							   std::fmax(d.final.parameters - cause.without.parameters, 1),
+							   double(problem.training) - d.final.parameters);
+	}
+	/* What cannot be told from its rivals comes first: that is then the verdict. */
+	auto open = [](const Cause &c) {
+		return std::any_of(c.rivals.begin(), c.rivals.end(), [](const Rival &r) { return r.inseparable; });
+	};
+	std::sort(d.causes.begin(), d.causes.end(),
+			  [&](const Cause &a, const Cause &b) { return open(a) != open(b) ? open(a) : a.delta < b.delta; });
 }
 
 std::vector<Dependence> Decider::map(const Fit &fit) const
@@ -442,15 +463,15 @@ bool Decider::needless(const Group &group) const
 
 void Decider::adequacy()
 {
-	d.left = map(d.final);
+	d.left = d.causes.empty() ? d.wrong : map(d.final);
 	d.structure = !d.left.empty();
 	if (d.causes.empty())
 		return;
-	for (const Dependence &dep : map(d.base))
+	for (const Dependence &dep : d.wrong)
 		if (dep.group->unknown && needless(*dep.group)) {
 			d.causes.clear();
 			d.final = d.base;
-			d.left = map(d.base);
+			d.left = d.wrong;
 			d.structure = true;
 			return;
 		}
@@ -461,7 +482,7 @@ void Decider::adequacy()
 	if (most > 0 && d.base.square - d.final.square < limits.half * (d.base.square - d.final.square + most)) {
 		d.causes.clear();
 		d.final = d.base;
-		d.left = map(d.base);
+		d.left = d.wrong;
 		d.structure = true;
 	}
 }
@@ -535,7 +556,7 @@ void Decider::staleness()
 			continue;
 		const Fit other = join(problem, as_is, s.part);
 		if (other.ok && other.cost - now.cost < limits.margin)
-			d.moved.rivals.push_back({effect, effect->name, other.cost - as_is.cost, false, true});
+			d.moved.rivals.push_back({effect, effect->name, other.cost - as_is.cost, false, true, other.hypothesis});
 	}
 }
 
@@ -568,9 +589,7 @@ Decision Decider::run()
 	}
 	d.wrong = map(d.base);
 	select();
-	exchange();
-	prune();
-	find_rivals();
+	settle();
 	adequacy();
 	staleness();
 	d.verdict = verdict();

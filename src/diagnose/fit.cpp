@@ -192,10 +192,12 @@ void Problem::refine_instants(Fit &fit, Rows which) const
 		if (slot.part < 0 || !instant(fit.hypothesis.parts[size_t(slot.part)].effect, slot.index))
 			continue;
 		const tactus_series *series = segments.front();
-		double best = square(fit.hypothesis);
-		for (double stride = 32; stride >= 1; stride /= 2)
+		double best = square(fit.hypothesis), widest = 1;
+		while (widest * 240 < double(series->n)) /* half of what the grid of instants is apart */
+			widest *= 2;
+		for (double stride = widest; stride >= 1; stride /= 2)
 			for (const double direction : {-1.0, 1.0})
-				for (int step = 0; step < 64; step++) {
+				for (int step = 0; step < 2; step++) {
 					Hypothesis moved = fit.hypothesis;
 					value(moved, slot) += direction * stride * series->dt;
 					const double there = square(moved);

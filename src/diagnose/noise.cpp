@@ -41,7 +41,7 @@ MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residua
 		order.emplace_back(-std::abs(kept.back().dot(r)), kept.size() - 1);
 	}
 	std::sort(order.begin(), order.end());
-	const size_t most = std::min<size_t>(order.size(), size_t(n / 5));
+	const size_t most = std::min<size_t>({order.size(), size_t(n / 5), 80});
 	MatrixXd z(n, Index(most) + 1);
 	for (size_t j = 0; j < most; j++)
 		z.col(Index(j)) = kept[order[j].second];
@@ -155,6 +155,9 @@ std::vector<double> further(const VectorXd &u, Index most)
 		a = next;
 		error *= 1 - k * k;
 		const double cost = double(n) * std::log(error) + 1.5 * double(order) * std::log(double(n));
+		/* A line in the spectrum (|last coefficient| = product of the poles' sizes, near 1) is no noise but a hum. */
+		if (std::abs(k) > 0.85)
+			break;
 		if (cost < least) {
 			least = cost;
 			best = a;

@@ -347,8 +347,10 @@ Scored Screen::score(const tactus_effect *effect) const
 		const std::vector<Point> points = points_of(problem, fit.hypothesis, y, effect, term, 60);
 		State trial = state;
 		Part part = result.part;
-		const double cost = add_best(trial, points, part);
-		if (term > 0 && !(cost < -10) && !result.part.free.empty())
+		const double before = state.residual.squaredNorm(), cost = add_best(trial, points, part);
+		/* A further term must be worth its while beside the first. */
+		if (!result.part.free.empty() &&
+			(!(cost < -10) || before - trial.residual.squaredNorm() < 0.1 * (square - before)))
 			continue;
 		if (cost == 0)
 			continue;

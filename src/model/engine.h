@@ -90,7 +90,7 @@ enum tactus_search_kind {
 typedef struct {
 	size_t parameter;
 	enum tactus_search_kind kind;
-	double values[6];
+	double values[10];
 	size_t count;
 	int term; /* parameters of one term go together; a further term is added if it helps (step 2, 3, …) */
 } tactus_search;

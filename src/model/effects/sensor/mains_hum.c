@@ -45,7 +45,8 @@ static const char *testable(const tactus_series *series)
 			   : "fewer than two cycles of the mains or its alias: the sampling is in step with it, or too short";
 }
 
-static const tactus_search searches[] = {{FREQUENCY, TACTUS_SEARCH_VALUES, {50, 60}, 2, 0}};
+static const tactus_search searches[] = {
+	{FREQUENCY, TACTUS_SEARCH_VALUES, {50, 60, 49.98, 50.02, 59.98, 60.02, 49.95, 50.05, 59.95, 60.05}, 10, 0}};
 
 const struct tactus_effect tactus_effect_sensor_mains_hum = {
 	.name = "mains-hum",
