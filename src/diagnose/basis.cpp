@@ -57,6 +57,20 @@ MatrixXd times(const MatrixXd &columns, const VectorXd &x)
 	return columns.array().colwise() * x.array();
 }
 
+/* x² z and x³ z, both about their means: what neither a curve of the one nor a coefficient of the other is. */
+MatrixXd crossed(const VectorXd &z, const VectorXd &x)
+{
+	auto scaled = [](const VectorXd &v) {
+		VectorXd s = v.unaryExpr([](double a) { return std::isfinite(a) ? a : 0.0; });
+		s.array() -= s.mean();
+		return VectorXd(s / std::fmax(s.norm() / std::sqrt(double(s.size())), 1e-300));
+	};
+	const VectorXd a = scaled(z), b = scaled(x);
+	MatrixXd columns(x.size(), 2);
+	columns << a.cwiseProduct(b.cwiseAbs2()), a.cwiseProduct(b.cwiseAbs2()).cwiseProduct(b);
+	return columns;
+}
+
 bool varies(const VectorXd &x)
 {
 	double low = INFINITY, high = -INFINITY;
@@ -199,6 +213,8 @@ std::vector<Group> groups_of(const Problem &problem, const std::vector<Extra> &e
 		collect.add(name, "level", hats(z, time ? 14 : 9), v);
 		if (s != problem.input_signal() || inputs > 1)
 			collect.add(name, "sensitivity", times(hats(z, time ? 12 : 5), gain), v);
+		if (signal.role == TACTUS_ROLE_COVARIATE && inputs == 1)
+			collect.add(name, "combination", crossed(v, x), v);
 		if (signal.role == TACTUS_ROLE_INPUT && inputs > 1)
 			logs.push_back(known(z));
 	}

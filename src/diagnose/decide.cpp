@@ -6,10 +6,17 @@
 #include <cmath>
 #include <cstring>
 
+#include "diagnose/limits.hpp"
+
 namespace tactus::explain
 {
 
-const Limits limits = {};
+#ifdef EXPLAIN_TRACE
+#include <ctime>
+#define STAGE(name) fprintf(stderr, "%.3f %s\n", double(clock()) / CLOCKS_PER_SEC, name)
+#else
+#define STAGE(name)
+#endif
 
 namespace
 {
@@ -239,6 +246,7 @@ class Decider
 	void adequacy();
 	void staleness();
 	bool needless(const Group &group) const;
+	double bursts(const Fit &fit) const;
 	std::vector<Dependence> map(const Fit &fit) const;
 	enum tactus_verdict verdict() const;
 
@@ -461,10 +469,35 @@ bool Decider::needless(const Group &group) const
 		   alone - both < limits.share * alone;
 }
 
+/*
+ * Noise that is Gaussian where nothing happens and large in some stretches is none: the share of the squares that the
+ * 2 % largest whitened readings hold, 0 if their kurtosis is that of noise.
+ */
+double Decider::bursts(const Fit &fit) const
+{
+	std::vector<double> squares;
+	for (Index i = 0; i < problem.rows(); i++)
+		if (problem.trains(i, Rows::train))
+			squares.push_back(fit.residual[i] * fit.residual[i]);
+	double second = 0, fourth = 0, largest = 0;
+	for (const double s : squares) {
+		second += s;
+		fourth += s * s;
+	}
+	const double n = double(squares.size()), kurtosis = n * fourth / (second * second);
+	if (!(kurtosis > limits.tails) || (kurtosis - 3) / std::sqrt(24 / n) < 12)
+		return 0;
+	std::sort(squares.rbegin(), squares.rend());
+	for (size_t i = 0; i < squares.size() / 50 + 1; i++)
+		largest += squares[i];
+	return largest / second;
+}
+
 void Decider::adequacy()
 {
 	d.left = d.causes.empty() ? d.wrong : map(d.final);
-	d.structure = !d.left.empty();
+	d.bursts = bursts(d.final);
+	d.structure = !d.left.empty() || d.bursts > 0;
 	if (d.causes.empty())
 		return;
 	for (const Dependence &dep : d.wrong)
@@ -525,6 +558,15 @@ void Decider::staleness()
 		d.moved.slots.push_back(pick);
 		now = best;
 	}
+	for (size_t i = 0; i < problem.domain->twin_count; i++) {
+		const tactus_twin &twin = problem.domain->twins[i];
+		const bool moved = std::any_of(d.moved.slots.begin(), d.moved.slots.end(),
+									   [&](const Slot &s) { return s.part < 0 && s.index == twin.base; });
+		if (moved && !twin.excluded(problem.segments.front())) {
+			d.moved.rivals.push_back({nullptr, twin.name, now.cost - as_is.cost, false, true, {}});
+			d.moved.separated_by = twin.separated_by;
+		}
+	}
 	d.moved.fit = now;
 	d.moved.delta = now.cost - as_is.cost;
 	d.stale = !d.moved.slots.empty();
@@ -576,22 +618,30 @@ enum tactus_verdict Decider::verdict() const
 
 Decision Decider::run()
 {
+	STAGE("noise known");
 	d.base = problem.fit(evidence.base, Rows::train);
 	if (!d.base.ok) {
 		d.verdict = TACTUS_VERDICT_BAD_RECORDING;
 		return d;
 	}
+	STAGE("based");
 	const Screen on_base(problem, d.base);
 	for (size_t i = 0; problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
 		d.why.push_back(effect->testable(problem.segments.front()));
 		d.screened.push_back(d.base.hypothesis.has(effect) ? Scored() : on_base.score(effect));
 	}
+	STAGE("screened");
 	d.wrong = map(d.base);
+	STAGE("mapped");
 	select();
+	STAGE("selected");
 	settle();
+	STAGE("settled");
 	adequacy();
+	STAGE("adequate");
 	staleness();
+	STAGE("stale");
 	d.verdict = verdict();
 	return d;
 }

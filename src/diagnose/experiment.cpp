@@ -6,6 +6,7 @@
 #include <tactus/device.h>
 
 #include "core/core.h"
+#include "diagnose/limits.hpp"
 #include "diagnose/report.hpp"
 
 namespace tactus::explain
@@ -285,7 +286,9 @@ const tactus_experiment *propose(Store &store, const Work &work, const char *dev
 	}
 	if (first)
 		return made(store, names, by_covariate(work, device, first->effect), text_of(first->effect), NAN);
-	const std::string apart = effect && effect->twin_separated_by ? effect->twin_separated_by : "another experiment";
+	const std::string apart = effect && effect->twin_separated_by ? effect->twin_separated_by
+							  : d.moved.separated_by              ? d.moved.separated_by
+																  : "another experiment";
 	std::string command = by_covariate(work, device, effect);
 	if (work.problem->domain == &tactus_domain_sensor)
 		command = scan_command(work, device, "--loads standard --mode dc,ac");

@@ -41,7 +41,7 @@ MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residua
 		order.emplace_back(-std::abs(kept.back().dot(r)), kept.size() - 1);
 	}
 	std::sort(order.begin(), order.end());
-	const size_t most = std::min<size_t>({order.size(), size_t(n / 5), 80});
+	const size_t most = std::min<size_t>({order.size(), size_t(n / 5), 160});
 	MatrixXd z(n, Index(most) + 1);
 	for (size_t j = 0; j < most; j++)
 		z.col(Index(j)) = kept[order[j].second];

@@ -310,6 +310,23 @@ void spectra(Store &store, const tactus_trace &trace, double dt, tactus_diagnose
 							   store.keep(correlation(after))};
 }
 
+const tactus_dependence *unexplained(Store &store, const Work &work, size_t *count)
+{
+	const Decision &d = work.decision;
+	std::vector<tactus_dependence> result;
+	const tactus_dependence *list = describe(store, work, d.left, d.final);
+	for (size_t i = 0; i < d.left.size(); i++)
+		result.push_back(list[i]);
+	if (d.bursts > 0)
+		result.push_back(
+			{"time_s", d.bursts, 0,
+			 store.format("what is left comes in bursts: a fiftieth of the readings holds %.0f %% of it, more "
+						  "than noise would",
+						  100 * d.bursts)});
+	*count = result.size();
+	return store.keep(std::move(result));
+}
+
 /* ---- the sentence that matters ---- */
 
 std::string names(const std::vector<std::string> &list, const char *last)
@@ -385,8 +402,7 @@ tactus_diagnosed report(Store &store, const Work &work, const char *device, uint
 	s.gain = measure_gain(store, work, seed, &gain, &low, &high);
 	s.causes = causes_of(store, work, gain, low, high, &s.cause_count);
 	s.structure_remains = d.structure && !d.causes.empty();
-	s.unexplained_count = d.left.size();
-	s.unexplained = describe(store, work, d.left, d.final);
+	s.unexplained = unexplained(store, work, &s.unexplained_count);
 	s.candidates = candidates_of(store, work, &s.candidate_count);
 	s.experiment = propose(store, work, device);
 	s.traces = traces_of(store, work, &s.trace_count);

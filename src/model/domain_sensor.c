@@ -3,6 +3,7 @@
 
 #include "core/core.h"
 #include "model/catalogue.h"
+#include "model/series.h"
 
 static const tactus_signal signals[SENSOR_SIGNALS] = {
 	[SENSOR_TIME] = {"time_s", "s", TACTUS_ROLE_TIME, NAN},
@@ -44,6 +45,18 @@ static const tactus_stage stages[] = {
 	[SENSOR_STAGE_OUTPUT] = {"output", enter_output},
 };
 
+/* ΔC = −td G: a delay of the phase detector in proportion to the frequency, or an offset at one frequency. */
+static bool several_frequencies(const struct tactus_series *series)
+{
+	return tactus_series_distinct(series, SENSOR_FREQUENCY, 3) > 2; /* dc rows have 0 */
+}
+
+static const char known_loads[] = "known resistors and capacitors in place of the sensor, at several frequencies";
+static const tactus_twin twins[] = {
+	{SENSOR_BASE_C1, "comparator-delay", known_loads, several_frequencies},
+	{SENSOR_BASE_C1, "phase-offset", known_loads, several_frequencies},
+};
+
 const struct tactus_domain tactus_domain_sensor = {
 	.name = "sensor",
 	.summary = "force → conductance and capacitance of a film sensor (any column with --input, --output)",
@@ -54,4 +67,6 @@ const struct tactus_domain tactus_domain_sensor = {
 	.base = base,
 	.base_count = TACTUS_COUNT(base),
 	.effects = tactus_effects_sensor,
+	.twins = twins,
+	.twin_count = TACTUS_COUNT(twins),
 };

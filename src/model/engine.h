@@ -145,6 +145,13 @@ typedef struct {
 	void (*enter)(const double *base, size_t n, double *const *signal);
 } tactus_stage;
 
+/* What moves a base parameter in exactly the same way though it is elsewhere in the bench. */
+typedef struct {
+	size_t base; /* index of the base parameter */
+	const char *name, *separated_by;
+	bool (*excluded)(const struct tactus_series *series); /* true if the recording holds what separates them */
+} tactus_twin;
+
 struct tactus_domain {
 	const char *name, *summary;
 	const tactus_signal *signals;
@@ -156,6 +163,8 @@ struct tactus_domain {
 	const tactus_parameter *base; /* base parameters; `neutral` is their default */
 	size_t base_count;
 	const tactus_effect *const *effects; /* the catalogue, NULL-terminated */
+	const tactus_twin *twins;            /* NULL if there are none */
+	size_t twin_count;
 };
 
 extern const struct tactus_domain tactus_domain_sensor, tactus_domain_readout;

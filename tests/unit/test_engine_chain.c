@@ -174,7 +174,7 @@ static void effects_of_a_stage_run_in_the_order_of_the_list(void **unused)
 {
 	(void)unused;
 	const tactus_effect *effects[] = {&tactus_effect_sensor_saturation, &tactus_effect_sensor_nonlinearity};
-	double base[4] = {0, 1, 0, 1}, saturation[] = {0.5};
+	double base[4] = {0, 1, 0, 1}, saturation[] = {0.5, 1};
 	double nonlinearity[TACTUS_PARAMETERS_MAX] = {0}, force = 3, result = 0;
 	for (size_t i = 0; i < effects[1]->parameter_count; i++)
 		nonlinearity[i] = effects[1]->parameters[i].kind == TACTUS_STRENGTH ? 2 : 1; /* F² with F0 = 1 N */
@@ -191,7 +191,7 @@ static void new_parameters_take_effect_and_neutral_ones_switch_off(void **unused
 {
 	(void)unused;
 	const tactus_effect *effects[] = {&tactus_effect_sensor_saturation};
-	double base[4] = {0, 1, 0, 1}, zero[] = {0}, half[] = {0.5}, force = 2, result = 0;
+	double base[4] = {0, 1, 0, 1}, zero[] = {0, 1}, half[] = {0.5, 1}, force = 2, result = 0;
 	const double *pointers[] = {zero};
 	double *signal[TACTUS_SIGNALS_MAX] = {[SENSOR_FORCE] = &force, [SENSOR_G] = &result};
 	tactus_chain *chain;

@@ -1,0 +1,32 @@
+/* Every number that a diagnosis decides by, in one place. */
+#ifndef TACTUS_DIAGNOSE_LIMITS_HPP
+#define TACTUS_DIAGNOSE_LIMITS_HPP
+
+#include <cstddef>
+
+namespace tactus::explain
+{
+
+/* Every threshold of the decision, with what it is of. BLIND.md says what they cost and gain. */
+struct Limits {
+	double evidence = 16;               /* fall of Schwarz's criterion that a cause must bring (e^8 : 1) */
+	double jump = 60, jump_share = 0.1; /* for instants, where held-out blocks cannot say */
+	double share = 0.05;                /* of the whitened squares that a cause must remove */
+	double further_share = 0.07;        /* and a further one, of all that was removed */
+	double relative_margin = 0.08;      /* and as a share of what the cause explains: no form is exact */
+	double margin = 10;                 /* over the runner-up, in Schwarz's criterion */
+	double parameter_share = 0.03;      /* of what an effect explains that each of its parameters must bring */
+	double paired = 2;                  /* standard errors, of paired held-out gains */
+	double structure_p = 1e-6;          /* of a dependence that is left, times the number looked at */
+	double structure = 0.02;            /* held-out share of the whitened squares that it must explain */
+	double half = 0.5;                  /* of what could be explained, that causes must explain to be named */
+	double hopeless = 0.4;              /* of the best evidence, below which a candidate is not fitted */
+	double far = 0.85;                  /* of a cause's evidence, below which a rival need not lose block by block */
+	double tails = 5;                   /* kurtosis of whitened readings above which they come in bursts */
+	size_t causes = 5, tried = 4;
+};
+inline constexpr Limits limits;
+
+} // namespace tactus::explain
+
+#endif
