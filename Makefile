@@ -204,7 +204,7 @@ $(BUILD)/bench_loops.so: tests/peers/bench_loops.c $(STATIC)
 
 # ---- checking ------------------------------------------------------------------------------------------------------
 
-SOURCES_C := $(LIB_C) $(CLI_C) $(UNIT_C) $(wildcard tests/install/*.c tests/peers/*.c)
+SOURCES_C := $(LIB_C) $(CLI_C) $(UNIT_C) $(wildcard tests/install/*.c tests/peers/*.c tests/fuzz/*.c)
 SOURCES := $(SOURCES_C) $(LIB_CXX) $(HEADERS) \
 	$(wildcard cli/*.h src/*/*.h src/*/*/*.h src/*/*/*/*.h tests/*/*.h tests/*/*.cpp)
 SCRIPTS := $(shell grep -lE '^\#!/bin/(ba)?sh|^\#!/usr/bin/env bash' scripts/* .ci/run 2>/dev/null)
@@ -272,6 +272,22 @@ THREADED := $(filter $(BUILD)/tests/test_threads $(BUILD)/tests/test_fit%,$(UNIT
 threaded: $(THREADED)
 	@scripts/run-tests $(BUILD) $(THREADED)
 
+# The library is compiled by clang once more, without the shared one and the program; a target is each tests/fuzz/fuzz_*.c.
+FUZZ_SECONDS ?= 120
+FUZZ := $(patsubst tests/fuzz/%.c,$(BUILD)/%,$(wildcard tests/fuzz/fuzz_*.c))
+.PHONY: fuzz
+fuzz: $(PROGRAM) ## fuzz recordings, models, protocols and the diagnosis for FUZZ_SECONDS (120) in all
+	+@$(parallel) BUILD=$(BUILD)/fuzz CC=clang CXX=clang++ OPT='-O1 -gline-tables-only' WERROR= \
+		SANITIZE='-fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer' fuzzers
+	@BUILD=$(BUILD) scripts/fuzz $(FUZZ_SECONDS)
+
+.PHONY: fuzzers
+fuzzers: $(FUZZ)
+
+$(BUILD)/fuzz_%: tests/fuzz/fuzz_%.c $(STATIC)
+	$(call say,FUZZ)$(CC) $(CPPFLAGS_ALL) $(CFLAGS_ALL) -fsanitize=fuzzer -fsanitize-link-c++-runtime $(DEPFLAGS) -MF $@.d $< -o $@ $(STATIC) \
+		$(LDFLAGS) $(LDLIBS_PRIVATE)
+
 .PHONY: coverage
 coverage: ## run unit and command-line tests with gcov and print what they reach
 	@scripts/setup --check
@@ -338,4 +354,4 @@ help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
 	@echo 'Variables: BUILD=$(BUILD) PREFIX=$(PREFIX) DESTDIR CC CXX OPT CFLAGS WERROR=1 V=1'
 
--include $(LIB_OBJ:.o=.d) $(CLI_OBJ:.o=.d) $(UNIT:%=%.d)
+-include $(LIB_OBJ:.o=.d) $(CLI_OBJ:.o=.d) $(UNIT:%=%.d) $(FUZZ:%=%.d)
