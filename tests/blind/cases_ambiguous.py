@@ -2,7 +2,8 @@
 recording without the experiment that separates the causes, and one with it.
 
 Without: right is `ambiguous` with the truth among causes and rivals (a stale parameter whose rivals hold the truth says
-the same). With: the truth named. Each row returns (bench, hidden effect or None, its amplitude, extra truth).
+the same). With: the truth named, or ambiguous for another reason, none of the row's causes (`apart`) in the set. Each
+row returns (bench, hidden effect or None, its amplitude, extra truth).
 
 Where a rival resembles the truth without being the same, `rival` gives what it can do, as columns; the noise is then
 made as loud as it takes for the truth to fit no better than the best rival, by more than APART of chi-squared.
@@ -89,7 +90,7 @@ def saturation_or_series_resistance(rng, separated):
     made = Hidden("saturation", "hyperbola", lambda s, x: x / (1 + s * x / bench.top_N), (1e-3, 6), (0.5, 3), "load")
     if separated:
         bench.metadata = lambda: {"switch_resistance_ohm": 78, "gain_resistor_ohm": 1800}
-    return bench, made, rng.uniform(6, 20), {}
+    return bench, made, rng.uniform(6, 20), {"apart": ["switch-resistance"]}
 
 
 @row
@@ -97,7 +98,9 @@ def capacitance_slope_or_delay(rng, separated):
     """A late comparator takes td G off the capacitance: a moved slope. With: known loads at several frequencies."""
     if separated:
         bench = ReadoutBench(rng)
-        return bench, form("comparator-delay", "overdriven", rng, bench), rng.uniform(5, 20), {}
+        made = form("comparator-delay", "overdriven", rng, bench)
+        made.start = made.limits = (2e-7, 8e-7)  # a capacitance that turns the phase as far would show in the amplitude
+        return bench, made, rng.uniform(5, 20), {"apart": ["phase-offset", "feedback-capacitance"]}
     bench = SensorBench(rng, Plan(), outputs=["conductance_S", "capacitance_F"])
     return bench, None, rng.uniform(5, 20), {"effects": ["comparator-delay"], "stale": "c1"}
 
@@ -111,6 +114,7 @@ def saturation_or_power(rng, separated):
     made = form("saturation", "compressed_grains", rng, bench)
     made.limits, made.start = ((3, 6), (4, 5)) if separated else ((0.05, 0.3), (0.15, 0.25))
     return bench, made, rng.uniform(*((8, 20) if separated else (1.2, 1.8))), {
+        "apart": ["nonlinearity"],
         "rival": lambda: [bench.top_N * (bench.force_N / bench.top_N) ** n for n in np.arange(0.3, 1, 0.02)]}
 
 
@@ -123,7 +127,7 @@ def lag_or_time_offset(rng, separated):
         made.start, made.limits = (10, 20), (8, 40)
     else:
         made.limits, made.start = (0.2, 2), (0.5, 1.2)
-    return bench, made, rng.uniform(*((3, 10) if separated else (2, 5))), {}
+    return bench, made, rng.uniform(*((3, 10) if separated else (2, 5))), {"apart": ["time-offset", "hysteresis"]}
 
 
 @row
@@ -132,6 +136,7 @@ def hysteresis_or_lag(rng, separated):
     bench = bench_of(rng, "hysteresis") if separated else one_sine(rng, 25.0, 14, lambda r: noise.white())
     made = form("hysteresis", "stick_slip_elements", rng, bench)
     return bench, made, rng.uniform(*((5, 15) if separated else (0.9, 1.4))), {
+        "apart": ["lag", "time-offset"],
         "rival": lambda: [bench.history.at(bench.time_s - bench.dt_s)]}
 
 
@@ -143,6 +148,7 @@ def creep_or_drift_or_temperature(rng, separated):
     made = form("creep", "kelvin_chain" if separated else "power_law_creep", rng, bench)
     t = bench.time_s / bench.duration_s
     return bench, made, rng.uniform(*((4, 12) if separated else (2, 5))), {
+        "apart": ["drift", "temperature", "cyclic-decline", "linear-decline"],
         "rival": lambda: [on * t ** n for on in (1, bench.force_N) for n in np.arange(0.1, 1, 0.02)]}
 
 
@@ -151,7 +157,7 @@ def linear_decline_or_gain_drift(rng, separated):
     """Cycling from zero without a pause. With: cycling and holding in turn, valleys above zero."""
     bench = bench_of(rng, "linear-decline") if separated else cycle_only(rng, 240, 2.0)
     made = form("linear-decline", "steady_wear", rng, bench)
-    return bench, made, rng.uniform(*((3, 10) if separated else (1.5, 3))), {}
+    return bench, made, rng.uniform(*((3, 10) if separated else (1.5, 3))), {"apart": ["drift"]}
 
 
 @row
@@ -160,7 +166,7 @@ def the_two_declines(rng, separated):
     bench = bench_of(rng, "cyclic-decline") if separated else cycle_only(rng, 160, 2.0, rng.uniform(0.25, 0.4))
     made = form("cyclic-decline", "work_hardening", rng, bench) if separated else \
         form("linear-decline", "steady_wear", rng, bench)
-    return bench, made, rng.uniform(*((3, 8) if separated else (1, 2))), {}
+    return bench, made, rng.uniform(*((3, 8) if separated else (1, 2))), {"apart": ["linear-decline"]}
 
 
 @row
@@ -212,7 +218,7 @@ def phase_offset_or_delay(rng, separated):
     """One frequency, loads whose phase is far from the folds. With: several frequencies and every load."""
     bench = ReadoutBench(rng, Grid() if separated else replace(ONE_FREQUENCY, resistance_ohm=(3e4, 3e5),
                                                                capacitance_F=(2e-9, 1e-8)))
-    return bench, form("phase-offset", "biased_filter", rng, bench), rng.uniform(4, 12), {}
+    return bench, form("phase-offset", "biased_filter", rng, bench), rng.uniform(4, 12), {"apart": ["comparator-delay"]}
 
 
 @row
@@ -230,7 +236,10 @@ def in_proportion_to_frequency(rng, separated):
                   capacitance_F=(1e-11, 1.2e-11), drive_V=(2, 5), rows=(600, 1200))
     bench = ReadoutBench(rng, Grid() if separated else narrow)
     made = form("feedback-capacitance", "beside_resistor", rng, bench)
-    return bench, made, rng.uniform(*((4, 12) if separated else (1, 2))), {}
+    if separated:  # at the highest frequency it takes a few per cent of the amplitude, which a delay does not
+        made.start = made.limits = tuple(x / (2 * np.pi * 1e5 * bench.stated_ohm) for x in (0.2, 0.5))
+    return bench, made, rng.uniform(*((4, 12) if separated else (1, 2))), {
+        "apart": ["comparator-delay", "amplifier-bandwidth"]}
 
 
 def better_than_rivals(bench, made, strength, sigma, columns):

@@ -181,11 +181,11 @@ def same_bench(effect, rng):
     if effect in READOUT:
         bench = ReadoutBench(rng)
         form = readout_same(effect, rng, bench)
-        if effect == "gain-error":
-            bench.free_gain = False
     else:
         bench = SensorBench(rng, plan_for(effect), outputs=["conductance_S"])
         form = SENSOR[effect](rng, bench)
+        if effect == "saturation":  # else a resistance in series would do the same
+            bench.metadata = lambda: {"switch_resistance_ohm": 78, "gain_resistor_ohm": 1800}
     bench.hidden.append(Hidden(effect, "same", form.apply, form.limits, form.start, form.stage))
     return bench, form
 

@@ -87,6 +87,9 @@ def stale_same_fresh_and_ambiguous():
     assert judged("ambiguous/x/without", row, said("ambiguous", ["time-offset"], ["lag"]), "ambiguous.without")
     assert not judged("ambiguous/x/without", row, said("cause-found", ["lag"]), "ambiguous.without")
     assert judged("ambiguous/x/with", {**row, "separated": True}, said("cause-found", ["lag"]), "ambiguous.with")
+    resolved = {**row, "separated": True, "apart": ["time-offset"]}
+    assert judged("ambiguous/x/with", resolved, said("ambiguous", ["lag"], ["creep"]), "ambiguous.with")
+    assert not judged("ambiguous/x/with", resolved, said("ambiguous", ["lag"], ["time-offset"]), "ambiguous.with")
     assert judged("one/lag", {"effects": ["lag"], "share": 0.5}, {"diagnosis": None}, "failed")
 
 

@@ -63,7 +63,6 @@ class ReadoutBench:
     def __init__(self, rng, grid=Grid(), colour=noise.any_colour):
         self.stated_ohm = float(rng.choice([1000, 1000, 2200, 4700]))
         self.channels = 8
-        self.free_gain = True
         self.lay_out(rng, grid)
         self.omega = 2 * np.pi * self.frequency_Hz
         self.ideal = self.read({})
@@ -97,6 +96,7 @@ class ReadoutBench:
             plan += [s for _ in range(turns) for s in [settings[i] for i in rng.permutation(len(settings))]]
             for f, v in plan:
                 order = np.arange(8) if in_order else rng.permutation(8)
+                before = len(rows)
                 for channel in order:
                     if by_row and f:
                         f, v = settings[rng.integers(len(settings))]
@@ -104,7 +104,7 @@ class ReadoutBench:
                     size = v * self.stated_ohm * abs(1 / r + 2j * np.pi * f * c)
                     if (grid.amplitude_V[0] < size or f == 0) and size < grid.amplitude_V[1]:
                         rows.append((sequence, channel, r, c, f, v))
-                sequence += 1
+                sequence += len(rows) > before
         kept = np.array(rows)
         self.sequence, self.channel = kept[:, 0].astype(int), kept[:, 1].astype(int)
         self.resistance_ohm, self.capacitance_F, self.frequency_Hz, self.drive_V = kept[:, 2:].T.copy()
@@ -160,15 +160,11 @@ class ReadoutBench:
     def hide(self, made, rng=None):
         self.hidden.append(made)
         self.hidden.sort(key=lambda h: STAGES.index(h.stage))
-        if made.effect == "gain-error":
-            self.free_gain = False
 
     def series(self, sigma):
         result = {}
         for name, rows in self.rows.items():
-            base = np.zeros((len(rows), 1))
-            if self.free_gain and name == "amplitude_V":
-                base[:, 0] = self.ideal["amplitude_V"]
+            base = np.zeros((len(rows), 1))  # the amplifier's resistor is stated, so the base has nothing to refit
             deviation = sigma * self.per_volt[name]
             result[name] = Output(rows, self.colours[name], deviation, deviation * self.noise[name], base)
         return {1: result}

@@ -89,8 +89,8 @@ PREFACE = """Made by `make blind`: recordings that hide effects, generated with 
 (`tests/blind`), answers kept apart and read by the scorer alone. Seeds: {seeds}."""
 
 EXPLANATION = """Shares are of the whitened residual variance after the base was refitted, known exactly: the generator
-has signal and noise apart. “Unique share” of one of two effects: what only it explains, of all that is left. What counts as
-right is written at the head of `tests/blind/score.py`."""
+has signal and noise apart. “Unique share” of one of two effects: what only it explains, of all that is left. What counts
+as right is written at the head of `tests/blind/score.py`."""
 
 
 def markdown(scored, seeds, real=()):

@@ -20,6 +20,7 @@ import hashlib
 import json
 import math
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -30,6 +31,7 @@ import generate
 import real
 import report
 import score
+from recording import model_text
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = (ROOT / os.environ.get("BUILD", "build")).resolve()
@@ -103,8 +105,14 @@ def rmse(measured, predicted, column):
 def gains(folder, name, fresh, extended):
     """Errors on recordings that the models have not seen, of the base fitted to the first one and of the extended
     model: output → {before: […], after: […]}."""
-    base = folder / "extended" / f"{name}-base.toml"
-    run_tactus("fit", folder / "recordings" / f"{name}.csv", "--model", "forward", "-o", base, "--overwrite", "--quiet")
+    base, first = folder / "extended" / f"{name}-base.toml", folder / "recordings" / f"{name}.csv"
+    stated = re.search(r"^# gain_resistor_ohm: (.*)$", first.read_text(encoding="utf-8"), re.MULTILINE)
+    if stated:  # as it is stated, so it is held
+        parameters = {"gain_resistor_ohm": (float(stated[1]), 0.0, "ohm")}
+        ranges = {"amplitude_V": (1.0, -1.0, 1.0), "phase_rad": (1.0, 0.0, 1.0)}
+        base.write_text(model_text("readout", parameters, ranges), encoding="utf-8")
+    else:
+        run_tactus("fit", first, "--model", "forward", "-o", base, "--overwrite", "--quiet")
     result = {}
     for path in fresh:
         measured = read_columns(path.read_text(encoding="utf-8"))
@@ -112,8 +120,8 @@ def gains(folder, name, fresh, extended):
             predicted = read_columns(run_tactus("simulate", "-m", model, path).stdout)
             for column in ("conductance_S", "capacitance_F", "amplitude_V", "phase_rad"):
                 if column in measured[0] and predicted and column in predicted[0]:
-                    result.setdefault(column, {"before": [], "after": []})[
-                                      when].append(rmse(measured, predicted, column))
+                    errors = result.setdefault(column, {"before": [], "after": []})
+                    errors[when].append(rmse(measured, predicted, column))
     return result
 
 

@@ -10,7 +10,8 @@ one        right: named first; or ambiguous with the truth in the set and a firs
 two        right: both named; "third": any other name
 unknown    right: unexplained, or structure_remains, or an entry in `unexplained`; wrong: cause-found with none of these
 stale      right: stale-calibration with the parameter first; "exact": it alone
-ambiguous  without the separating experiment: ambiguous (or stale-calibration) with the truth in the set; with it: named
+ambiguous  without the separating experiment: ambiguous (or stale-calibration) with the truth in the set; with it: named,
+           or ambiguous for another reason: none of the causes that the experiment separates in the set
 
 The limit of 20 % (two effects: 10 %) is on the true share of the whitened residual variance, computed by the generator.
 """
@@ -44,7 +45,7 @@ TARGETS = {  # figure: (text, at least or at most, share)
     "unknown.covariate": ("of those with a column: the column among `unexplained`", None, None),
     "stale.right": ("stale calibration, share ≥ 20 %: named with the parameter", "min", 0.95),
     "stale.exact": ("of these: that parameter alone", None, None),
-    "same.covered": ("same form, named: 1.96 standard errors cover the true parameter", "between", (0.90, 0.99)),
+    "same.covered": ("same form: 1.96 standard errors cover the true parameter", "between", (0.90, 0.99)),
     "same.named": ("same form, share ≥ 20 %: named at all", None, None),
     "fresh.agrees": ("gain on ten fresh recordings within the reported interval", "min", 0.90),
     "ambiguous.without": ("causes that cannot be told apart, without the experiment: ambiguous", "min", 1.0),
@@ -191,7 +192,7 @@ def judge_same(truth, answer, every, extended=None):
     if truth["share"] >= LIMIT_ONE:
         yield "same.named", effect in answer.named
     for cause in answer.series.get("causes") or []:
-        if cause["effect"] != effect or not answer.named:
+        if cause["effect"] != effect or answer.verdict not in ("cause-found", "ambiguous"):
             continue
         stated = {p["name"]: p for p in cause["parameters"]}
         parameter = stated.get(truth["parameter"])
@@ -218,7 +219,8 @@ def judge_fresh(truth, answer, fresh):
 def judge_ambiguous(truth, answer, every):
     effect = truth["effects"][0]
     if truth["separated"]:
-        yield "ambiguous.with", effect in answer.named
+        other = answer.verdict == "ambiguous" and effect in answer.set and not answer.set & set(truth.get("apart", []))
+        yield "ambiguous.with", effect in answer.named or other
     else:
         stale = answer.verdict == "stale-calibration" and truth.get("earlier", "stale" in truth)
         yield "ambiguous.without", (answer.verdict == "ambiguous" or stale) and effect in answer.set
