@@ -61,6 +61,10 @@ def stale_same_fresh_and_ambiguous():
     moved["diagnosis"]["series"][0]["causes"][0]["parameters"] = [{"name": "g1"}, {"name": "g0"}]
     assert judged("stale/g1", old, moved, "stale.right") and not judged("stale/g1", old, moved, "stale.exact")
     assert not judged("stale/g0", {**old, "parameter": "g0"}, moved, "stale.right")
+    for rival, right in (("voltage-dependence", True), ("nonlinearity", False)):
+        twin = said("ambiguous", ["stale-calibration"], [rival])
+        twin["diagnosis"]["series"][0]["causes"][0]["parameters"] = [{"name": "g1"}]
+        assert judged("stale/g1", old, twin, "stale.right") is right and not judged("stale/g1", old, twin, "stale.plain")
 
     truth = {
     "effects": ["temperature"],
