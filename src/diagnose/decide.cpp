@@ -11,13 +11,6 @@
 namespace tactus::explain
 {
 
-#ifdef EXPLAIN_TRACE
-#include <ctime>
-#define STAGE(name) fprintf(stderr, "%.3f %s\n", double(clock()) / CLOCKS_PER_SEC, name)
-#else
-#define STAGE(name)
-#endif
-
 namespace
 {
 
@@ -282,10 +275,6 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 			break;
 		tried++;
 		const Fit joined = join(problem, fit, s.part);
-#ifdef EXPLAIN_TRACE
-		fprintf(stderr, "  try %s linear %.1f joint %.1f ok %d\n", s.part.effect->name, s.cost,
-				joined.ok ? joined.cost - fit.cost : NAN, joined.ok);
-#endif
 		if (joined.ok && stands(joined, fit, d.base.square - fit.square) &&
 			(!best.ok || merit(joined, fit) < merit(best, fit))) {
 			best = joined;
@@ -305,12 +294,6 @@ bool Decider::stands(const Fit &with, const Fit &without, double removed) const
 			   instant(with.hypothesis.parts[size_t(slot.part)].effect, slot.index);
 	});
 	const bool jumps = instants == 1 || instants == 2; /* more are a staircase, which must foretell */
-#ifdef EXPLAIN_TRACE
-	fprintf(stderr, "  stands? ok %d evidence %.1f share %.3f further %.3f paired %.2f (n %ld square %.0f -> %.0f)\n",
-			with.ok, without.cost - with.cost, gain / without.square, gain / (removed + gain),
-			with.ok ? paired(problem, problem.held_out(without), problem.held_out(with)) : 0, long(problem.training),
-			without.square, with.square);
-#endif
 	return with.ok && without.cost - with.cost > limits.evidence && gain > limits.share * without.square &&
 		   gain > limits.further_share * (removed + gain) &&
 		   ((jumps && without.cost - with.cost > limits.jump && gain > limits.jump_share * without.square) ||
@@ -379,10 +362,6 @@ bool Decider::challenge(Cause &cause)
 		const double t = paired(problem, problem.held_out(other), ours), theirs = merit(other, left);
 		const bool apart = theirs - mine > std::fmax(limits.margin, -limits.relative_margin * mine) &&
 						   (t > limits.paired || (t > 0 && theirs > limits.far * mine));
-#ifdef EXPLAIN_TRACE
-		fprintf(stderr, "  rival of %s: %s merit %.1f against %.1f paired %.2f\n", cause.effect->name,
-				s.part.effect->name, theirs, mine, t);
-#endif
 		if (testable(s.part.effect) && theirs < mine - limits.margin && (!better.ok || theirs < merit(better, left))) {
 			better = other;
 			effect = s.part.effect;
@@ -618,30 +597,22 @@ enum tactus_verdict Decider::verdict() const
 
 Decision Decider::run()
 {
-	STAGE("noise known");
 	d.base = problem.fit(evidence.base, Rows::train);
 	if (!d.base.ok) {
 		d.verdict = TACTUS_VERDICT_BAD_RECORDING;
 		return d;
 	}
-	STAGE("based");
 	const Screen on_base(problem, d.base);
 	for (size_t i = 0; problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
 		d.why.push_back(effect->testable(problem.segments.front()));
 		d.screened.push_back(d.base.hypothesis.has(effect) ? Scored() : on_base.score(effect));
 	}
-	STAGE("screened");
 	d.wrong = map(d.base);
-	STAGE("mapped");
 	select();
-	STAGE("selected");
 	settle();
-	STAGE("settled");
 	adequacy();
-	STAGE("adequate");
 	staleness();
-	STAGE("stale");
 	d.verdict = verdict();
 	return d;
 }

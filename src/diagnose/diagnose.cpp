@@ -133,6 +133,7 @@ int Diagnosis::gate()
 			}
 			rows.back().push_back(nullptr);
 		}
+		channels.reserve(rows.size());
 		for (const std::vector<bool *> &row : rows)
 			channels.push_back(row.data());
 		tactus_gate_problems found = {nullptr, 0, 0};

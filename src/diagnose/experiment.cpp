@@ -199,6 +199,7 @@ const tactus_experiment *made(Store &store, const std::vector<std::string> &name
 							  const std::string &text, double evidence)
 {
 	std::vector<const char *> list;
+	list.reserve(names.size());
 	for (const std::string &name : names)
 		list.push_back(store.text(name));
 	tactus_experiment e{};

@@ -224,6 +224,7 @@ Fit Problem::fit(const Hypothesis &start, Rows which) const
 	});
 	for (int round = 0; round < (steps ? 2 : 1) && !moving.empty(); round++) {
 		std::vector<double> values;
+		values.reserve(moving.size());
 		for (const Slot &slot : moving)
 			values.push_back(value(result.hypothesis, slot));
 		ceres::Problem problem;

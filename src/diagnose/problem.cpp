@@ -139,7 +139,7 @@ void Problem::make_blocks()
 	int training_blocks = 0;
 	for (int b = 0; b < block_count; b++) {
 		test[size_t(b)] = whole_recordings ? size_t(b / per) * 3 >= count * 2 : b % 4 == 2;
-		fold[size_t(b)] = char(training_blocks++ % 8);
+		fold[size_t(b)] = training_blocks++ % 8;
 	}
 	auto block_at = [&](const Run &run, Index i) {
 		const double share = double(sample[size_t(run.first + i)]) / double(segments[run.segment]->n);

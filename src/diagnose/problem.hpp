@@ -91,7 +91,7 @@ class Problem
 	std::vector<int> block;     /* of every row: hold-out unit, −1 in a gap between two that are apart */
 	int block_count = 0;
 	std::vector<char> test; /* per block: no choice sees it */
-	std::vector<char> fold; /* per block that trains */
+	std::vector<int> fold;  /* per block that trains */
 	bool whole_recordings = false;
 	VectorXd measured; /* reading / scale of its output */
 	double scale[TACTUS_OUTPUTS_MAX] = {}, range[TACTUS_OUTPUTS_MAX] = {};

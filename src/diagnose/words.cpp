@@ -32,7 +32,7 @@ const char *Store::format(const char *format, ...)
 
 std::string unit_of(const Work &work, const char *unit)
 {
-	const std::string text = unit;
+	std::string text = unit;
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
 		const std::string word = "output" + std::to_string(o);
 		if (text.compare(0, word.size(), word) == 0)
@@ -89,7 +89,7 @@ Bins bins_of(const Problem &problem, size_t output, const VectorXd &values, cons
 	return bins;
 }
 
-std::string shape_of(const Bins &bins)
+const char *shape_of(const Bins &bins)
 {
 	const auto [low, high] = std::minmax_element(bins.mean.begin(), bins.mean.end());
 	const auto l = size_t(low - bins.mean.begin()), h = size_t(high - bins.mean.begin()), n = bins.mean.size();
@@ -135,31 +135,32 @@ const tactus_dependence *describe(Store &store, const Work &work, const std::vec
 				shown = bins;
 			}
 		}
-		std::string text;
-		const std::string what = work.output_name[output];
-		if (group.aspect == "history")
-			text = what + " depends on what " + name + " was before, not only on what it is";
-		else if (group.aspect == "direction")
-			text = what + " differs between rising and falling " + name;
-		else if (group.aspect == "sensitivity")
-			text = "the sensitivity of " + what + " changes with " + name;
-		else if (!shown.mean.empty()) {
-			const auto [low, high] = std::minmax_element(shown.mean.begin(), shown.mean.end());
-			const std::string unit = work.output_unit[output];
-			const double scale = problem.scale[output];
-			const double at_low = shown.at[size_t(low - shown.mean.begin())],
-						 at_high = shown.at[size_t(high - shown.mean.begin())];
-			text = "the residual of " + what + " " + shape_of(shown) + " " + name + ": " +
-				   quantity(*low * scale, unit) + " around " + quantity(at_low, unit_in_name(name)) + ", " +
-				   quantity(*high * scale, unit) + " around " + quantity(at_high, unit_in_name(name));
+		const char *what = work.output_name[output].c_str(), *on = name.c_str(), *text;
+		if (group.aspect == "history") {
+			text = store.format("%s depends on what %s was before, not only on what it is", what, on);
+		} else if (group.aspect == "direction") {
+			text = store.format("%s differs between rising and falling %s", what, on);
+		} else if (group.aspect == "sensitivity") {
+			text = store.format("the sensitivity of %s changes with %s", what, on);
+		} else if (shown.mean.empty()) {
+			text = store.format("%s depends on %s", what, on);
 		} else {
-			text = what + " depends on " + name;
+			const auto [low, high] = std::minmax_element(shown.mean.begin(), shown.mean.end());
+			const std::string unit = work.output_unit[output], unit_of_it = unit_in_name(name);
+			auto place = [&](auto extreme) {
+				std::string words = quantity(*extreme * problem.scale[output], unit);
+				words += " around ";
+				words += quantity(shown.at[size_t(extreme - shown.mean.begin())], unit_of_it);
+				return words;
+			};
+			text = store.format("the residual of %s %s %s: %s, %s", what, shape_of(shown), on, place(low).c_str(),
+								place(high).c_str());
 		}
 		if (group.unknown)
-			text += " (a column that no cause of the catalogue knows)";
+			text = store.format("%s (a column that no cause of the catalogue knows)", text);
 		else if (problem.segments.size() > 1 && name == "time_s")
-			text += ", at the same times in every recording: an unrecorded cause";
-		result.push_back({store.text(name), dep.explained, dep.p_value, store.text(text)});
+			text = store.format("%s, at the same times in every recording: an unrecorded cause", text);
+		result.push_back({store.text(name), dep.explained, dep.p_value, text});
 	}
 	return store.keep(std::move(result));
 }
