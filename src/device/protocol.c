@@ -35,7 +35,7 @@ static double staircase_force_N(const tactus_protocol_step *step, double time_s)
 	const double rises = staircase_rises(step);
 	double level = floor(time_s / step->time_s + 1e-9);
 	if (level > rises && step->returns)
-		level = 2 * rises - level;
+		level = fmax(2 * rises - level, 0); /* the very end rounds up to one level more */
 	if (level >= rises)
 		return step->to_N;
 	return step->from_N + copysign(level * step->force_N, step->to_N - step->from_N);

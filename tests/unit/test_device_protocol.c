@@ -37,6 +37,8 @@ static void test_every_word_has_its_load_over_time(void **state)
 		{"staircase 0N..10N..0N 5N 1s", 4.5, 0},
 		{"staircase 0N..10N..0N 4N 1s", 3.5, 10}, /* 0 4 8 10 8 4 0 */
 		{"staircase 0N..10N..0N 4N 1s", 4.5, 8},
+		{"staircase 0N..10N..0N 4N 1s", 7, 0}, /* and ends where it began */
+		{"staircase 0N..10N..0N 4N 1s, ramp 2N 2s", 8, 1},
 		{"triangle 0.25Hz 1N..4N 60s", 0, 1},
 		{"triangle 0.25Hz 1N..4N 60s", 1, 2.5},
 		{"triangle 0.25Hz 1N..4N 60s", 2, 4},
