@@ -7,7 +7,7 @@
 
 #include "fuzz.h"
 
-enum { ROWS_MAX = 160, CHANNELS_MAX = 2, RECORDINGS_MAX = 3 };
+enum { ROWS_MAX = 80, CHANNELS_MAX = 2, RECORDINGS_MAX = 3 };
 
 struct bytes {
 	const uint8_t *data;
