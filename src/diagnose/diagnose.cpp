@@ -74,7 +74,8 @@ class Diagnosis
 	std::vector<Recording> recordings;
 	std::vector<Work> works;
 	std::vector<std::vector<std::pair<size_t, size_t>>> members; /* per work: recording, series */
-	std::map<int, const char *> hopeless;                        /* per channel; 0: all */
+	std::map<int, std::vector<size_t>> wild; /* per channel: rows of readings that are left out from the start */
+	std::map<int, const char *> hopeless;    /* per channel; 0: all */
 	std::unique_ptr<Store> store;
 };
 
@@ -106,6 +107,9 @@ int Diagnosis::split()
 							whole = whole && s.signal[k] && std::isfinite(s.signal[k][i]);
 					use[i] = whole;
 				}
+				if (s.domain == &tactus_domain_sensor)
+					for (const size_t i : find_wild(&s, s.signal[signal], use))
+						wild[s.channel].push_back(s.row[i]);
 				outputs.push_back(std::move(use));
 			}
 			r.use.push_back(std::move(outputs));
@@ -593,8 +597,8 @@ int Diagnosis::run()
 							 ? options.device
 							 : tactus_metadata_get(tactus_table_metadata(recordings.front().table), "device");
 	for (Work &work : works) {
-		if (!work.outliers.empty()) {
-			std::vector<size_t> rows;
+		if (!work.outliers.empty() || !wild[work.channel].empty()) {
+			std::vector<size_t> rows = wild[work.channel];
 			for (const size_t row : work.outliers)
 				for (const Run &run : work.problem->runs)
 					if (Index(row) >= run.first && Index(row) < run.first + run.count)

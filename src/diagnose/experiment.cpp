@@ -92,7 +92,7 @@ struct Synthetic {
 	static double typical(const tactus_series *like, size_t s)
 	{
 		std::vector<double> values;
-		for (size_t i = 0; i < like->n; i++)
+		for (size_t i = 0; like->signal[s] && i < like->n; i++)
 			if (std::isfinite(like->signal[s][i]))
 				values.push_back(like->signal[s][i]);
 		if (values.empty())

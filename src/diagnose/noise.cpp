@@ -239,6 +239,45 @@ Noise estimate_noise(const Problem &problem, const VectorXd &y, const MatrixXd &
 	return noise;
 }
 
+std::vector<size_t> find_wild(const tactus_series *series, const double *y, std::vector<char> &use)
+{
+	std::vector<size_t> at, found;
+	for (size_t i = 0; y && i < use.size(); i++)
+		if (use[i])
+			at.push_back(i);
+	if (at.size() < 50)
+		return found;
+	std::vector<double> off(at.size(), 0);
+	for (size_t k = 2; k + 2 < at.size(); k++) {
+		double around[5];
+		for (size_t j = 0; j < 5; j++)
+			around[j] = y[at[k + j - 2]];
+		std::nth_element(around, around + 2, around + 5);
+		off[k] = std::abs(y[at[k]] - around[2]);
+	}
+	std::vector<double> sorted = off;
+	const size_t most = sorted.size() - 1 - sorted.size() / 50;
+	std::nth_element(sorted.begin(), sorted.begin() + long(most), sorted.end());
+	const double limit = 10 * sorted[most];
+	const double *x = nullptr;
+	for (size_t s = 0; s < series->domain->signal_count && !x; s++)
+		if (series->domain->signals[s].role == TACTUS_ROLE_INPUT)
+			x = series->signal[s];
+	double low = INFINITY, high = -INFINITY;
+	for (const size_t i : at) {
+		low = std::fmin(low, x ? x[i] : 0);
+		high = std::fmax(high, x ? x[i] : 0);
+	}
+	for (size_t k = 2; k + 2 < at.size() && limit > 0; k++) {
+		const bool moves = x && std::abs(x[at[k]] - 0.5 * (x[at[k - 1]] + x[at[k + 1]])) > 0.05 * (high - low);
+		if (off[k] > limit && !moves)
+			found.push_back(at[k]);
+	}
+	for (const size_t i : found)
+		use[i] = 0;
+	return found;
+}
+
 std::vector<size_t> find_outliers(Problem &problem, const VectorXd &left)
 {
 	std::vector<size_t> found;

@@ -15,6 +15,12 @@ namespace tactus::explain
  */
 Noise estimate_noise(const Problem &problem, const VectorXd &y, const MatrixXd &columns, VectorXd &left);
 
+/*
+ * The same before anything is fitted, for readings so far off that they would set the scale of everything: far from the
+ * median of the five around them, beside what such distances are elsewhere. Clears use; the samples are returned.
+ */
+std::vector<size_t> find_wild(const tactus_series *series, const double *y, std::vector<char> &use);
+
 /* Isolated wild readings: far off while their neighbours in time are not and the input rests. Sets problem.excluded. */
 std::vector<size_t> find_outliers(Problem &problem, const VectorXd &left);
 

@@ -47,7 +47,7 @@ struct Work {
 	Hypothesis given;
 	bool has_given = false;
 	size_t every = 1;
-	std::vector<size_t> outliers;
+	std::vector<size_t> outliers;   /* rows of the problem */
 	const char *hopeless = nullptr; /* why nothing can be said */
 	Decision decision;
 	Fit full;                   /* the last model, fitted to all rows */
