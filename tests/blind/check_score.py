@@ -40,6 +40,11 @@ def pairs_nulls_and_unknowns():
     third = said("cause-found", ["drift", "lag", "creep"])
     assert judged("two/sensor", pair, third, "two.right") and not judged("two/sensor", pair, third, "two.third")
     assert judged("two/sensor", {**pair, "share": 0.05}, third, "two.right") is None
+    for causes, rivals, right in ((["lag", "drift"], ["time-offset"], True), (["time-offset", "drift"], ["lag"], True),
+                                  (["time-offset", "drift"], [], False), (["dead-zone", "drift"], ["lag"], False)):
+        unsure = said("ambiguous", causes, rivals)
+        assert judged("two/sensor", pair, unsure, "two.right") is right, causes
+        assert judged("two/sensor", pair, unsure, "two.third") is ("dead-zone" not in causes)
     for verdict in ("cause-found", "ambiguous", "nothing-wrong", "unexplained"):
         false = verdict in ("cause-found", "ambiguous")
         assert judged("null/sensor", {"effects": []}, said(verdict, ["lag"] if false else []), "null.false") is false

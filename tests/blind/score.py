@@ -7,7 +7,8 @@ set        of an ambiguous verdict: its causes and their rivals
 one        right: named first; or ambiguous with the truth in the set and a first cause that EFFECTS.md lists as
            confusable with the truth; for gain-error, which is Rg, also stale-calibration of gain_resistor_ohm; for
            output-clipping and adc-quantisation also bad-recording with a problem of that kind
-two        right: both named; "third": any other name
+two        right: both named; or ambiguous with both in the set, every cause being one of them or, by EFFECTS.md,
+           confusable with one; "plain": the former; "third": any other cause
 unknown    right: unexplained, or structure_remains, or an entry in `unexplained`; wrong: cause-found with none of these
 stale      right: stale-calibration with the parameter first, or ambiguous with it first and no rivals but those that
            EFFECTS.md calls the same thing (TWINS); "plain": the former; "exact": that parameter alone
@@ -40,6 +41,7 @@ TARGETS = {  # figure: (text, at least or at most, share)
     "one.wrong": ("one effect, all: another name first, as cause-found", "max", 0.01),
     "one.extra": ("one effect, all: any wrong name among the causes", "max", 0.01),
     "two.right": ("two effects, each unique share ≥ 10 %: both named", "min", 0.85),
+    "two.plain": ("of all of these: with the verdict cause-found", None, None),
     "two.third": ("two effects, each ≥ 10 %: no third", "min", 0.97),
     "unknown.right": ("cause not in the catalogue, share ≥ 20 %: unexplained or structure remains", "min", 0.90),
     "unknown.wrong": ("cause not in the catalogue, all: a confident wrong name", "max", 0.02),
@@ -149,8 +151,12 @@ def judge_one(truth, answer, every):
 
 def judge_two(truth, answer, every):
     if truth["share"] >= LIMIT_TWO:
-        yield "two.right", set(truth["effects"]) <= set(answer.named)
-        yield "two.third", set(answer.named) <= set(truth["effects"])
+        pair, plain = set(truth["effects"]), set(truth["effects"]) <= set(answer.named)
+        ambiguous = answer.verdict == "ambiguous"
+        related = all(c in pair or ambiguous and any(confusable(c, t) for t in pair) for c in answer.causes)
+        yield "two.right", plain or ambiguous and pair <= answer.set and related
+        yield "two.plain", plain
+        yield "two.third", related or answer.verdict not in ("cause-found", "ambiguous")
 
 
 def judge_unknown(truth, answer, every):
@@ -221,7 +227,7 @@ def judge_same(truth, answer, every, extended=None):
 def judge_fresh(truth, answer, fresh):
     """The mean over the fresh recordings of 1 − rmse after / rmse before, against the interval of `gain`."""
     gain = answer.series.get("gain") or {}
-    if answer.named and gain.get("ci95") and fresh:
+    if answer.causes and gain.get("ci95") and fresh:
         output = OUTPUT_OF_UNIT.get(gain.get("unit"))
         if output in fresh:
             gains = [1 - a / b for a, b in zip(fresh[output]["after"], fresh[output]["before"])]
