@@ -49,15 +49,15 @@ static double lattice(double *values, size_t n)
 			values[codes++] = values[i];
 	if (codes < 3 || codes > n / 3)
 		return 0;
-	double gaps[64],
-		step; /* of codes spread evenly over all: their lower quartile is one step, unless codes are rare */
+	/* Gaps between codes spread evenly over all: their lower quartile is one step, unless codes are rare. */
+	double gaps[64] = {0};
 	size_t count = codes - 1 < 64 ? codes - 1 : 64;
 	for (size_t k = 0; k < count; k++) {
 		size_t i = 1 + k * (codes - 1) / count;
 		gaps[k] = values[i] - values[i - 1];
 	}
 	qsort(gaps, count, sizeof *gaps, ascending);
-	step = gaps[count / 4];
+	double step = gaps[count / 4];
 	/* The step that the codes are nearest to whole multiples of; a real converter's are not quite even. */
 	double off = 0;
 	for (int pass = 0; pass < 20; pass++) {
