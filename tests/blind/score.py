@@ -6,7 +6,7 @@ named      verdict cause-found and the effect among `causes`; "first" is the str
 set        of an ambiguous verdict: its causes and their rivals
 one        right: named first; or ambiguous with the truth in the set and a first cause that EFFECTS.md lists as
            confusable with the truth; for gain-error, which is Rg, also stale-calibration of gain_resistor_ohm; for
-           output-clipping and adc-quantisation also bad-recording with a problem of that kind
+           output-clipping and adc-quantisation also bad-recording with a problem of that kind; "plain": named first
 two        right: both named; or ambiguous with both in the set, every cause being one of them or, by EFFECTS.md,
            confusable with one; "plain": the former; "third": any other cause
 unknown    right: unexplained, or structure_remains, or an entry in `unexplained`; wrong: cause-found with none of these
@@ -37,6 +37,7 @@ TARGETS = {  # figure: (text, at least or at most, share)
     "null.false": ("nulls: a false cause (cause-found, ambiguous or stale-calibration)", "max", 0.0),
     "null.structure": ("nulls called unexplained or bad", None, None),
     "one.right": ("one effect, share ≥ 20 %: right", "min", 0.97),
+    "one.plain": ("of all of these: with the verdict cause-found", None, None),
     "one.below": ("one effect, share < 20 %: right or an honest lesser verdict", "min", 0.97),
     "one.wrong": ("one effect, all: another name first, as cause-found", "max", 0.01),
     "one.extra": ("one effect, all: any wrong name among the causes", "max", 0.01),
@@ -145,6 +146,8 @@ def judge_one(truth, answer, every):
     first = [a.causes[0] for a in every if a.named]
     yield ("one.right" if truth["share"] >= LIMIT_ONE else "one.below",
            right if truth["share"] >= LIMIT_ONE else right or not answer.named)
+    if truth["share"] >= LIMIT_ONE:
+        yield "one.plain", answer.named[:1] == [effect]
     yield "one.wrong", any(n != effect for n in first)
     yield "one.extra", any(n != effect for n in names)
 
