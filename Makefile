@@ -187,6 +187,10 @@ cli-test: all ## the tests of the command line (bats)
 install-test: all ## build C and C++ programs against an installed copy and run them
 	@scripts/run-tests $(BUILD) install
 
+.PHONY: blind
+blind: all ## diagnose some two thousand recordings that hide effects and write BLIND.md (an hour)
+	@BUILD=$(BUILD) PYTHONDONTWRITEBYTECODE=1 $${PYTHON:-/usr/bin/python3} tests/blind/run.py --suite full --jobs 2
+
 .PHONY: published
 published: all ## error reductions on the simulated bench beside the paper's Table I
 	@BUILD=$(BUILD) scripts/published

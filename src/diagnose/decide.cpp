@@ -228,6 +228,21 @@ class Decider
 	{
 		return effect->testable(problem.segments.front()) == nullptr;
 	}
+	/* The signal of the covariate that an effect acts through, -1 if that is none of the domain's. */
+	int column_of(const tactus_effect *effect) const
+	{
+		for (size_t s = 0; s < problem.domain->signal_count; s++)
+			if (strcmp(problem.domain->signals[s].name, effect->covariate) == 0 &&
+				problem.domain->signals[s].role == TACTUS_ROLE_COVARIATE)
+				return int(s);
+		return -1;
+	}
+	/* Without the column nothing can be simulated: no rival either. */
+	bool recorded(const tactus_effect *effect) const
+	{
+		const int column = column_of(effect);
+		return column < 0 || problem.segments.front()->recorded[column];
+	}
 	std::vector<Scored> screen(const Fit &fit, bool all) const;
 	Fit best_next(const Fit &fit, const tactus_effect **effect) const;
 	bool stands(const Fit &with, const Fit &without, double removed) const;
@@ -255,7 +270,7 @@ std::vector<Scored> Decider::screen(const Fit &fit, bool all) const
 	std::vector<Scored> scored;
 	for (size_t i = 0; problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
-		if (fit.hypothesis.has(effect) || (!all && !testable(effect)))
+		if (fit.hypothesis.has(effect) || !recorded(effect) || (!all && !testable(effect)))
 			continue;
 		scored.push_back(screen.score(effect));
 	}
@@ -555,15 +570,9 @@ void Decider::staleness()
 	const Screen screen(problem, as_is);
 	for (size_t i = 0; problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
-		if (as_is.hypothesis.has(effect))
+		if (as_is.hypothesis.has(effect) || !recorded(effect))
 			continue;
-		const int column = [&] {
-			for (size_t s = 0; s < problem.domain->signal_count; s++)
-				if (strcmp(problem.domain->signals[s].name, effect->covariate) == 0 &&
-					problem.domain->signals[s].role == TACTUS_ROLE_COVARIATE)
-					return int(s);
-			return -1;
-		}();
+		const int column = column_of(effect);
 		/* The calibration says that it was made under the same conditions: then these changed nothing. */
 		double then;
 		if (column >= 0 && evidence.provenance &&

@@ -63,7 +63,7 @@ std::vector<double> grid_of(const Problem &problem, const tactus_effect *effect,
 	case TACTUS_SEARCH_INSTANT:
 		return instants_of(problem, instants);
 	case TACTUS_SEARCH_VALUES:
-		for (size_t i = 0; i < search.count; i++)
+		for (int i = 0; i < search.count; i++)
 			values.push_back(problem.ranged(info, search.values[i]));
 		break;
 	case TACTUS_SEARCH_PROPOSED:

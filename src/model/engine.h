@@ -90,9 +90,8 @@ enum tactus_search_kind {
 typedef struct {
 	size_t parameter;
 	enum tactus_search_kind kind;
+	int count;
 	double values[10];
-	size_t count;
-	int term; /* parameters of one term go together; a further term is added if it helps (step 2, 3, …) */
 } tactus_search;
 
 /* What a series has to offer: n samples of every signal of the domain, after columns were mapped; see series.h. */
@@ -119,7 +118,9 @@ struct tactus_effect {
 	const char *(*testable)(const struct tactus_series *series);
 	const tactus_search *searches; /* NULL if there are none */
 	size_t search_count;
-	int (*term)(size_t parameter); /* the term that a parameter belongs to, from 0; NULL: all of them to 0 */
+	/* Parameters of one term go together, and a further term (step 2, 3, …) is added if it helps: the term of a
+	 * parameter, from 0. NULL: all of them are of term 0. */
+	int (*term)(size_t parameter);
 	/* Values that a TACTUS_SEARCH_PROPOSED parameter may have in this series, at most `most`; NULL if there is none. */
 	size_t (*propose)(const struct tactus_series *series, size_t parameter, double *values, size_t most);
 	/*

@@ -94,8 +94,8 @@ static int term(size_t parameter)
 	return (int)parameter;
 }
 
-static const tactus_search searches[] = {{AMPLITUDE_STEP, TACTUS_SEARCH_EXACT, {0}, 0, 0},
-										 {PHASE_STEP, TACTUS_SEARCH_EXACT, {0}, 0, 1}};
+static const tactus_search searches[] = {{AMPLITUDE_STEP, TACTUS_SEARCH_EXACT, 0, {0}},
+										 {PHASE_STEP, TACTUS_SEARCH_EXACT, 0, {0}}};
 
 const struct tactus_effect tactus_effect_readout_adc_quantisation = {
 	.name = "adc-quantisation",

@@ -56,8 +56,8 @@ static size_t propose(const tactus_series *series, size_t parameter, double *val
 	return most;
 }
 
-static const tactus_search searches[] = {{AVERAGING, TACTUS_SEARCH_VALUES, {1, 0}, 2, 0},
-										 {INVERSE_LEVEL, TACTUS_SEARCH_PROPOSED, {0}, 0, 0}};
+static const tactus_search searches[] = {{AVERAGING, TACTUS_SEARCH_VALUES, 2, {1, 0}},
+										 {INVERSE_LEVEL, TACTUS_SEARCH_PROPOSED, 0, {0}}};
 
 const struct tactus_effect tactus_effect_readout_output_clipping = {
 	.name = "output-clipping",

@@ -35,7 +35,7 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 	tactus_cycles_process(p, state, n, signal, decline);
 }
 
-static const tactus_search searches[] = {{HALF_AMPLITUDE, TACTUS_SEARCH_VALUES, {0.05, 0.2, 1}, 3, 0}};
+static const tactus_search searches[] = {{HALF_AMPLITUDE, TACTUS_SEARCH_VALUES, 3, {0.05, 0.2, 1}}};
 
 const struct tactus_effect tactus_effect_sensor_cyclic_decline = {
 	.name = "cyclic-decline",

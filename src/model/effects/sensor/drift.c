@@ -35,7 +35,7 @@ static const char *testable(const tactus_series *series)
 	return why ? why : tactus_series_duration_s(series) > 0 ? NULL : "time_s never advances";
 }
 
-static const tactus_search searches[] = {{EXPONENT, TACTUS_SEARCH_VALUES, {0.3, 0.6, 1, 2}, 4, 0}};
+static const tactus_search searches[] = {{EXPONENT, TACTUS_SEARCH_VALUES, 4, {0.3, 0.6, 1, 2}}};
 
 const struct tactus_effect tactus_effect_sensor_drift = {
 	.name = "drift",

@@ -82,7 +82,7 @@ static int term(size_t parameter)
 	return parameter >= WEIGHT && parameter != INITIAL_BRANCH;
 }
 
-static const tactus_search searches[] = {{RATIO, TACTUS_SEARCH_VALUES, {0.3, 0.6, 0.9}, 3, 0}};
+static const tactus_search searches[] = {{RATIO, TACTUS_SEARCH_VALUES, 3, {0.3, 0.6, 0.9}}};
 
 const struct tactus_effect tactus_effect_sensor_hysteresis = {
 	.name = "hysteresis",

@@ -43,7 +43,7 @@ static const char *testable(const tactus_series *series)
 	return tactus_want_force_range(series);
 }
 
-static const tactus_search searches[] = {{TIME_CONSTANT, TACTUS_SEARCH_TIME, {0}, 0, 0}};
+static const tactus_search searches[] = {{TIME_CONSTANT, TACTUS_SEARCH_TIME, 0, {0}}};
 
 const struct tactus_effect tactus_effect_sensor_lag = {
 	.name = "lag",

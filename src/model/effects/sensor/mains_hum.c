@@ -46,7 +46,7 @@ static const char *testable(const tactus_series *series)
 }
 
 static const tactus_search searches[] = {
-	{FREQUENCY, TACTUS_SEARCH_VALUES, {50, 60, 49.98, 50.02, 59.98, 60.02, 49.95, 50.05, 59.95, 60.05}, 10, 0}};
+	{FREQUENCY, TACTUS_SEARCH_VALUES, 10, {50, 60, 49.98, 50.02, 59.98, 60.02, 49.95, 50.05, 59.95, 60.05}}};
 
 const struct tactus_effect tactus_effect_sensor_mains_hum = {
 	.name = "mains-hum",

@@ -22,7 +22,7 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 			force[i] /= pow(1 + pow(p[INVERSE_LOAD] * fabs(force[i]), p[SHARPNESS]), 1 / p[SHARPNESS]);
 }
 
-static const tactus_search searches[] = {{SHARPNESS, TACTUS_SEARCH_VALUES, {1, 2, 4}, 3, 0}};
+static const tactus_search searches[] = {{SHARPNESS, TACTUS_SEARCH_VALUES, 3, {1, 2, 4}}};
 
 /* A scan that states the switch's resistance has had it removed by `convert`. */
 static bool series_resistance_known(const tactus_series *series, const tactus_metadata *metadata)

@@ -51,7 +51,7 @@ static const char *testable(const tactus_series *series)
 			   : "drive_V never changes";
 }
 
-static const tactus_search searches[] = {{TIME_CONSTANT, TACTUS_SEARCH_TIME, {0}, 0, 0}};
+static const tactus_search searches[] = {{TIME_CONSTANT, TACTUS_SEARCH_TIME, 0, {0}}};
 
 const struct tactus_effect tactus_effect_sensor_self_heating = {
 	.name = "self-heating",

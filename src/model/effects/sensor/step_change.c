@@ -47,10 +47,10 @@ static int term(size_t parameter)
 	return (int)(parameter / PER_STEP);
 }
 
-static const tactus_search searches[] = {{TIME, TACTUS_SEARCH_INSTANT, {0}, 0, 0},
-										 {PER_STEP + TIME, TACTUS_SEARCH_INSTANT, {0}, 0, 1},
-										 {2 * PER_STEP + TIME, TACTUS_SEARCH_INSTANT, {0}, 0, 2},
-										 {3 * PER_STEP + TIME, TACTUS_SEARCH_INSTANT, {0}, 0, 3}};
+static const tactus_search searches[] = {{TIME, TACTUS_SEARCH_INSTANT, 0, {0}},
+										 {PER_STEP + TIME, TACTUS_SEARCH_INSTANT, 0, {0}},
+										 {2 * PER_STEP + TIME, TACTUS_SEARCH_INSTANT, 0, {0}},
+										 {3 * PER_STEP + TIME, TACTUS_SEARCH_INSTANT, 0, {0}}};
 
 const struct tactus_effect tactus_effect_sensor_step_change = {
 	.name = "step-change",

@@ -98,7 +98,7 @@ static const char *testable(const tactus_series *series)
 	return tactus_series_distinct(series, SENSOR_FORCE, 2) < 2 ? "the load never changes" : NULL;
 }
 
-static const tactus_search searches[] = {{0, TACTUS_SEARCH_TIME, {0}, 0, 0}};
+static const tactus_search searches[] = {{0, TACTUS_SEARCH_TIME, 0, {0}}};
 
 const struct tactus_effect tactus_effect_sensor_time_offset = {
 	.name = "time-offset",

@@ -1,0 +1,171 @@
+/* The diagnosis of whole recordings: what it names, what it does not, and that it says the same whatever the threads.
+ */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <tactus/diagnose.h>
+#include <tactus/tactus.h>
+
+enum { N = 1500 };
+
+/* Sums of uniform numbers from a fixed generator: as good as Gaussian here. */
+static double noise(uint64_t *state)
+{
+	double sum = -6;
+	for (int i = 0; i < 12; i++) {
+		*state = *state * 6364136223846793005u + 1442695040888963407u;
+		sum += (double)(*state >> 11) / 9007199254740992.0;
+	}
+	return sum;
+}
+
+/* Loads: a staircase up and down, rests, a slow sine. */
+static double load_N(double t)
+{
+	if (t < 10 || (t > 70 && t < 90))
+		return 0;
+	if (t <= 70)
+		return 10 * floor(t / 10) * (t <= 40 ? 1 : 0) + (t > 40 ? 10 * floor((80 - t) / 10) : 0);
+	return 20 - 20 * cos(2 * 3.14159265358979 * (t - 90) / 20);
+}
+
+/* A spring in series with a Kelvin element: its strain by Euler's rule in small steps; share of the load, τ = 8 s. */
+static tactus_table *recording(double creep, double gain, uint64_t seed)
+{
+	tactus_table *table = tactus_table_new();
+	assert_int_equal(tactus_table_resize(table, N), 0);
+	/* Every column is asked for again once all are there: adding one may move the others. */
+	tactus_table_set_numbers(table, "time_s");
+	tactus_table_set_numbers(table, "force_N");
+	tactus_table_set_numbers(table, "conductance_S");
+	double *time = tactus_table_set_numbers(table, "time_s"), *force = tactus_table_set_numbers(table, "force_N"),
+		   *g = tactus_table_set_numbers(table, "conductance_S"), strain = 0;
+	for (size_t i = 0; i < N; i++) {
+		time[i] = 0.1 * (double)i;
+		force[i] = load_N(time[i]);
+		for (int k = 0; k < 50; k++)
+			strain += 0.002 / 8 * (force[i] - strain);
+		g[i] = 2e-6 + gain * 4e-7 * (force[i] + creep * strain) + 5e-8 * noise(&seed);
+	}
+	return table;
+}
+
+static const tactus_diagnosis *diagnosed(tactus_table *table, const tactus_diagnose_options *options)
+{
+	const tactus_diagnosis *diagnosis = NULL;
+	const tactus_table *tables[] = {table};
+	assert_int_equal(tactus_diagnose(tables, 1, options, &diagnosis), 0);
+	assert_int_equal(diagnosis->series_count, 1);
+	return diagnosis;
+}
+
+static void nothing_hidden_is_nothing_wrong(void **unused)
+{
+	(void)unused;
+	for (uint64_t seed = 1; seed <= 3; seed++) {
+		tactus_table *table = recording(0, 1, seed);
+		const tactus_diagnosis *d = diagnosed(table, NULL);
+		assert_int_equal(d->verdict, TACTUS_VERDICT_NOTHING_WRONG);
+		assert_int_equal(d->series[0].cause_count, 0);
+		assert_null(d->series[0].gain);
+		/* The noise that went in, to the accuracy of its estimate from 1500 readings (2 %), with room. */
+		assert_true(fabs(d->series[0].base[0].noise_floor / 5e-8 - 1) < 0.1);
+		tactus_diagnosis_free(d);
+		tactus_table_free(table);
+	}
+}
+
+static void creep_is_named_and_its_gain_is_what_it_does(void **unused)
+{
+	(void)unused;
+	tactus_table *table = recording(0.08, 1, 4);
+	const tactus_diagnosis *d = diagnosed(table, NULL);
+	const tactus_diagnosed *s = &d->series[0];
+	assert_int_equal(d->verdict, TACTUS_VERDICT_CAUSE_FOUND);
+	assert_int_equal(s->cause_count, 1);
+	assert_string_equal(s->causes[0].effect, "creep");
+	assert_true(s->causes[0].delta_bic < -100);
+	/* What is left on held-out stretches is the noise (20 %: the form is another, τ = 8 s lies between its decades). */
+	assert_true(fabs(s->gain->rmse_after / 5e-8 - 1) < 0.2);
+	assert_true(s->gain->ci95[0] < s->gain->reduction && s->gain->reduction < s->gain->ci95[1]);
+	assert_true(s->gain->force_rmse_after_N < 0.6 * s->gain->force_rmse_before_N);
+	/* The extended model simulates at once. */
+	tactus_simulator *simulator;
+	assert_int_equal(tactus_simulator_new(d->extended, table, 0, &simulator), 0);
+	assert_int_equal(tactus_simulator_block(simulator, table), 0);
+	tactus_simulator_free(simulator);
+	tactus_diagnosis_free(d);
+	tactus_table_free(table);
+}
+
+static void moved_sensitivity_is_a_stale_calibration(void **unused)
+{
+	(void)unused;
+	tactus_table *fresh = recording(0, 1, 5), *later = recording(0, 1.08, 6);
+	const tactus_diagnosis *first = diagnosed(fresh, NULL);
+	const tactus_diagnose_options options = {.model = first->extended};
+	const tactus_diagnosis *d = diagnosed(later, &options), *same = diagnosed(fresh, &options);
+	assert_int_equal(same->verdict, TACTUS_VERDICT_NOTHING_WRONG);
+	assert_int_equal(d->verdict, TACTUS_VERDICT_STALE_CALIBRATION);
+	const tactus_cause *cause = &d->series[0].causes[0];
+	assert_string_equal(cause->effect, "stale-calibration");
+	assert_int_equal(cause->parameter_count, 1);
+	assert_string_equal(cause->parameters[0].name, "g1");
+	assert_true(fabs(cause->parameters[0].value / (1.08 * 4e-7) - 1) <
+				4 * cause->parameters[0].standard_error / 4e-7 + 1e-4);
+	tactus_diagnosis_free(d);
+	tactus_diagnosis_free(same);
+	tactus_diagnosis_free(first);
+	tactus_table_free(fresh);
+	tactus_table_free(later);
+}
+
+static void scale_does_not_matter(void **unused)
+{
+	(void)unused;
+	const double scales[] = {1e-12, 1e12};
+	for (size_t k = 0; k < 2; k++) {
+		tactus_table *table = recording(0.08, 1, 7);
+		double *g = tactus_table_set_numbers(table, "conductance_S");
+		uint64_t seed = 7;
+		double strain = 0;
+		for (size_t i = 0; i < N; i++) {
+			for (int step = 0; step < 50; step++)
+				strain += 0.002 / 8 * (load_N(0.1 * (double)i) - strain);
+			g[i] = scales[k] * (2e-6 + 4e-7 * (load_N(0.1 * (double)i) + 0.08 * strain) + 5e-8 * noise(&seed));
+		}
+		const tactus_diagnosis *d = diagnosed(table, NULL);
+		assert_int_equal(d->verdict, TACTUS_VERDICT_CAUSE_FOUND);
+		assert_string_equal(d->series[0].causes[0].effect, "creep");
+		tactus_diagnosis_free(d);
+		tactus_table_free(table);
+	}
+}
+
+static void misuse_is_refused(void **unused)
+{
+	(void)unused;
+	const tactus_diagnosis *d = NULL;
+	assert_int_equal(tactus_diagnose(NULL, 0, NULL, &d), TACTUS_ERR_ARGUMENT);
+	assert_null(d);
+	assert_string_equal(tactus_verdict_name(TACTUS_VERDICT_AMBIGUOUS), "ambiguous");
+	tactus_diagnosis_free(NULL);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(nothing_hidden_is_nothing_wrong),
+		cmocka_unit_test(creep_is_named_and_its_gain_is_what_it_does),
+		cmocka_unit_test(moved_sensitivity_is_a_stale_calibration),
+		cmocka_unit_test(scale_does_not_matter),
+		cmocka_unit_test(misuse_is_refused),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
