@@ -5,6 +5,13 @@
 
 enum { SAMPLES = 600, CHANNELS_MAX = 4 };
 
+/* Which part of `length` samples the i-th belongs to. */
+static double part(size_t i, size_t length)
+{
+	size_t number = i / length;
+	return (double)number;
+}
+
 /* A recording of one channel at 10 Hz: a load of many turns, conductance with a noise of 0.5 % of its range. */
 static tactus_table *good(size_t n)
 {
@@ -55,7 +62,7 @@ static verdict judge(tactus_table *table)
 	}
 	rig_ok(tactus_gates(table, series, count, use, &v.problems));
 	for (size_t i = 0; i < series[0].n; i++)
-		v.used += outputs[0][0][i];
+		v.used += use[0][0][i];
 	free(memory);
 	tactus_series_free(series, count);
 	tactus_table_free(table);
@@ -124,8 +131,8 @@ static void a_staircase_without_noise_is_neither_coarse_nor_clipped(void **unuse
 	(void)unused;
 	tactus_table *table = good(SAMPLES);
 	for (size_t i = 0; i < SAMPLES; i++) {
-		values(table, "force_N")[i] = (double)(i / 50) + 0.01 * tactus_random_normal(3, 2, i);
-		values(table, "conductance_S")[i] = rig_g0 + rig_g1 * (double)(i / 50);
+		values(table, "force_N")[i] = part(i, 50) + 0.01 * tactus_random_normal(3, 2, i);
+		values(table, "conductance_S")[i] = rig_g0 + rig_g1 * part(i, 50);
 	}
 	expect_none(table);
 }
@@ -141,7 +148,7 @@ static void a_jump_of_the_clock_is_a_gap_and_pauses_at_equal_distances_are_not(v
 	expect(table, "clock-gap", 0, false, SAMPLES, "jumps before row 300 (50 s), by 20.1 s, where a step is 0.1 s");
 	table = good(SAMPLES);
 	for (size_t i = 0; i < SAMPLES; i++)
-		values(table, "time_s")[i] += 20 * (double)(i / 100);
+		values(table, "time_s")[i] += 20 * part(i, 100);
 	expect_none(table);
 }
 
@@ -192,9 +199,8 @@ static void a_hold_that_is_clipped_is_found_by_its_missing_noise(void **unused)
 	(void)unused;
 	tactus_table *table = good(SAMPLES);
 	for (size_t i = 0; i < SAMPLES; i++) {
-		values(table, "force_N")[i] = (double)(i / 60);
-		values(table, "conductance_S")[i] =
-			fmin(8.5e-5, rig_g1 * ((double)(i / 60) + 0.05 * tactus_random_normal(3, 2, i)));
+		values(table, "force_N")[i] = part(i, 60);
+		values(table, "conductance_S")[i] = fmin(8.5e-5, rig_g1 * (part(i, 60) + 0.05 * tactus_random_normal(3, 2, i)));
 	}
 	expect(table, "clipped", 1, false, SAMPLES - 60, "from row 540 (54 s) to row 599");
 }
@@ -349,7 +355,7 @@ static tactus_table *readout(void)
 	double *channel = rig_column(table, "channel"), *frequency = rig_column(table, "frequency_Hz");
 	double *amplitude = rig_column(table, "amplitude_V"), *sequence = rig_column(table, "sequence");
 	for (size_t i = 0; i < SAMPLES; i++) {
-		sequence[i] = (double)(i / 4);
+		sequence[i] = part(i, 4);
 		channel[i] = (double)(i % 4 + 1);
 		ohm[i] = 1000 * pow(2, (double)((i + i / 4) % 7));
 		drive[i] = (double)(i / 28 % 3 + 1);
