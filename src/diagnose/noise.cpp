@@ -269,7 +269,8 @@ std::vector<size_t> find_wild(const tactus_series *series, const double *y, std:
 		high = std::fmax(high, x ? x[i] : 0);
 	}
 	for (size_t k = 2; k + 2 < at.size() && limit > 0; k++) {
-		const bool moves = x && std::abs(x[at[k]] - 0.5 * (x[at[k - 1]] + x[at[k + 1]])) > 0.05 * (high - low);
+		const bool moves =
+			x && std::fmax(std::abs(x[at[k]] - x[at[k - 1]]), std::abs(x[at[k + 1]] - x[at[k]])) > 0.02 * (high - low);
 		if (off[k] > limit && !moves)
 			found.push_back(at[k]);
 	}

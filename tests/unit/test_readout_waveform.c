@@ -310,7 +310,8 @@ static void dc_readings_are_the_signed_mean_of_the_settled_samples(void **state)
 			const double *std = tactus_table_numbers(table, "amplitude_std_V");
 			rig_text(tactus_table_texts(table, "mode")[r], dc ? "dc" : "ac");
 			assert_true(tactus_table_numbers(table, "channel")[r] == channels[c]);
-			assert_true(tactus_table_numbers(table, "sequence")[r] == (double)(r / (2 * CHANNELS)));
+			const size_t scan = r / (2 * CHANNELS);
+			assert_true(tactus_table_numbers(table, "sequence")[r] == (double)scan);
 			assert_true(tactus_table_numbers(table, "frequency_Hz")[r] == (dc ? 0 : frequency));
 			rig_near(tactus_table_numbers(table, "drive_V")[r], dc ? dc_drive : drive_peak, 1e-9);
 			assert_true(isnan(tactus_table_numbers(table, "phase_rad")[r]) == dc);
