@@ -258,7 +258,14 @@ std::vector<size_t> find_wild(const tactus_series *series, const double *y, std:
 	std::vector<double> sorted = off;
 	const size_t most = sorted.size() - 1 - sorted.size() / 50;
 	std::nth_element(sorted.begin(), sorted.begin() + long(most), sorted.end());
-	const double limit = 10 * sorted[most];
+	/* Only what lies outside of everything else sets the scale; find_outliers() judges the others. */
+	std::vector<double> range;
+	range.reserve(at.size());
+	for (const size_t i : at)
+		range.push_back(y[i]);
+	std::sort(range.begin(), range.end());
+	const double span = range[range.size() - 1 - range.size() / 50] - range[range.size() / 50];
+	const double limit = std::fmax(10 * sorted[most], span);
 	const double *x = nullptr;
 	for (size_t s = 0; s < series->domain->signal_count && !x; s++)
 		if (series->domain->signals[s].role == TACTUS_ROLE_INPUT)
