@@ -62,13 +62,9 @@ bool drop_idle(Hypothesis &h, const tactus_effect *effect, bool &changed)
 		for (const size_t p : part.free) {
 			const tactus_parameter &info = effect->parameters[p];
 			const bool at_bound = part.value[p] <= info.lower || part.value[p] >= info.upper;
-			if (info.kind == TACTUS_STRENGTH && part.value[p] == info.neutral && at_bound) {
-				changed = true;
-				continue;
-			}
-			if (info.kind == TACTUS_STRENGTH && at_bound)
+			if (at_bound && info.kind == TACTUS_STRENGTH && part.value[p] != info.neutral)
 				return false;
-			if (info.kind != TACTUS_STRENGTH && at_bound) { /* as good as stated */
+			if (at_bound) { /* neutral, or as good as stated */
 				changed = true;
 				continue;
 			}
@@ -121,10 +117,14 @@ Fit join(const Problem &problem, const Fit &fit, const Part &part)
  * No form of the catalogue is exact: what a parameter buys must be worth a share of all that the effect explains, or a
  * flexible wrong cause (a staircase of steps) would beat a plain right one (a trend).
  */
+static double earned(const Fit &with, const Fit &without)
+{
+	return std::fmax(1 - limits.parameter_share * (with.parameters - without.parameters), 0.1);
+}
+
 double merit(const Fit &with, const Fit &without)
 {
-	return (with.cost - without.cost) *
-		   std::fmax(1 - limits.parameter_share * (with.parameters - without.parameters), 0.1);
+	return (with.cost - without.cost) * earned(with, without);
 }
 
 namespace
@@ -301,8 +301,7 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 
 bool Decider::stands(const Fit &with, const Fit &without, double removed) const
 {
-	const double gain = (without.square - with.square) *
-						std::fmax(1 - limits.parameter_share * (with.parameters - without.parameters), 0.1);
+	const double gain = (without.square - with.square) * earned(with, without);
 	/* A jump shows at its instant: the block that holds it cannot be foretold from the others. */
 	const auto instants = std::count_if(with.slots.begin(), with.slots.end(), [&](const Slot &slot) {
 		return slot.part >= 0 && !without.hypothesis.has(with.hypothesis.parts[size_t(slot.part)].effect) &&

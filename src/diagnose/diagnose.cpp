@@ -234,7 +234,6 @@ const char *const computed[] = {"resistance_ohm",
 std::vector<Extra> Diagnosis::extras(const Work &work, const std::vector<size_t> &index) const
 {
 	std::vector<Extra> result;
-	(void)work;
 	const Recording &first = recordings[members[index[0]][0].first];
 	const tactus_series &series = first.series[members[index[0]][0].second];
 	for (size_t column = 0; column < tactus_table_columns(first.table) && result.size() < 40; column++) {
