@@ -5,6 +5,7 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 #include <cstring>
+#include <memory>
 
 #include "diagnose/limits.hpp"
 
@@ -260,6 +261,7 @@ class Decider
 
 	const Evidence &evidence;
 	const Problem &problem;
+	std::unique_ptr<Shelf> shelf;
 	Decision d;
 };
 
@@ -272,7 +274,7 @@ std::vector<Scored> Decider::screen(const Fit &fit, bool all) const
 		const tactus_effect *effect = problem.domain->effects[i];
 		if (fit.hypothesis.has(effect) || !recorded(effect) || (!all && !testable(effect)))
 			continue;
-		scored.push_back(screen.score(effect));
+		scored.push_back(screen.score(*shelf, effect));
 	}
 	std::sort(scored.begin(), scored.end(), [](const Scored &a, const Scored &b) { return a.cost < b.cost; });
 	return scored;
@@ -580,7 +582,7 @@ void Decider::staleness()
 			continue;
 		if (testable(effect))
 			continue;
-		const Scored s = screen.score(effect);
+		const Scored s = screen.score(*shelf, effect);
 		if (s.part.free.empty() || !(s.cost < d.moved.delta + 3 * limits.margin))
 			continue;
 		const Fit other = join(problem, as_is, s.part);
@@ -610,11 +612,12 @@ Decision Decider::run()
 		d.verdict = TACTUS_VERDICT_BAD_RECORDING;
 		return d;
 	}
+	shelf = std::make_unique<Shelf>(problem, d.base.hypothesis);
 	const Screen on_base(problem, d.base);
 	for (size_t i = 0; problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
 		d.why.push_back(effect->testable(problem.segments.front()));
-		d.screened.push_back(d.base.hypothesis.has(effect) ? Scored() : on_base.score(effect));
+		d.screened.push_back(d.base.hypothesis.has(effect) ? Scored() : on_base.score(*shelf, effect));
 	}
 	d.wrong = map(d.base);
 	select();

@@ -319,24 +319,20 @@ void Diagnosis::noise(Work &work, const VectorXd &y, const Hypothesis &h, bool c
 		const tactus_effect *effect = problem.domain->effects[i];
 		if (h.has(effect) || effect->testable(problem.segments.front()))
 			continue;
-		for (const Point &point : points_of(problem, h, y, effect, 0, 12))
-			for (Index j = 0; j < point.columns.cols(); j++)
-				columns.push_back(point.columns.col(j));
+		Grid grid = grid_of(problem, h, y, effect, 0, true, [](const VectorXd &column) { return column; });
+		std::move(grid.columns.begin(), grid.columns.end(), std::back_inserter(columns));
 	}
 	for (const Group &group : work.evidence.groups)
 		for (Index j = 0; j < group.columns.cols(); j++)
 			columns.push_back(group.columns.col(j));
-	MatrixXd all(problem.rows(), Index(columns.size()));
-	for (size_t j = 0; j < columns.size(); j++)
-		all.col(Index(j)) = columns[j];
 	VectorXd left;
-	problem.noise = estimate_noise(problem, y, all, left);
+	problem.noise = estimate_noise(problem, y, columns, left);
 	if (!candidates)
 		return;
 	const std::vector<size_t> outliers = find_outliers(problem, left);
 	if (!outliers.empty()) {
 		work.outliers = outliers;
-		problem.noise = estimate_noise(problem, y, all, left);
+		problem.noise = estimate_noise(problem, y, columns, left);
 		problem.count_training();
 	}
 }

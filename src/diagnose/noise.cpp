@@ -11,7 +11,7 @@ namespace
 {
 
 /* The most telling columns of one output, of length 1, with the residual last; their own part only. */
-MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residual, const MatrixXd &columns)
+MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residual, const std::vector<VectorXd> &columns)
 {
 	std::vector<std::pair<Index, Index>> pieces;
 	Index n = 0;
@@ -20,54 +20,37 @@ MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residua
 			pieces.emplace_back(run.first, run.count);
 			n += run.count;
 		}
-	auto gather = [&](const auto &from) {
-		VectorXd to(n);
-		Index at = 0;
-		for (const auto &[first, count] : pieces) {
-			to.segment(at, count) = from.segment(first, count);
-			at += count;
-		}
-		return to;
-	};
-	const VectorXd r = gather(residual);
-	std::vector<VectorXd> kept;
 	std::vector<std::pair<double, size_t>> order;
-	for (Index j = 0; j < columns.cols(); j++) {
-		VectorXd c = gather(columns.col(j));
-		const double size = c.norm();
-		if (!(size > 0) || !c.allFinite())
-			continue;
-		kept.push_back(c / size);
-		order.emplace_back(-std::abs(kept.back().dot(r)), kept.size() - 1);
+	std::vector<double> size(columns.size());
+	for (size_t j = 0; j < columns.size(); j++) {
+		double square = 0, product = 0;
+		for (const auto &[first, count] : pieces) {
+			square += columns[j].segment(first, count).squaredNorm();
+			product += columns[j].segment(first, count).dot(residual.segment(first, count));
+		}
+		size[j] = std::sqrt(square);
+		if (size[j] > 0 && std::isfinite(size[j]))
+			order.emplace_back(-std::abs(product) / size[j], j);
 	}
 	std::sort(order.begin(), order.end());
-	const size_t most = std::min<size_t>({order.size(), size_t(n / 5), 160});
-	MatrixXd z(n, Index(most) + 1);
-	for (size_t j = 0; j < most; j++)
-		z.col(Index(j)) = kept[order[j].second];
-	z.col(Index(most)) = r;
+	order.resize(std::min<size_t>({order.size(), size_t(n / 5), 160}));
+	MatrixXd z(n, Index(order.size()) + 1);
+	Index at = 0;
+	for (const auto &[first, count] : pieces) {
+		for (size_t j = 0; j < order.size(); j++)
+			z.col(Index(j)).segment(at, count) =
+				columns[order[j].second].segment(first, count) / size[order[j].second];
+		z.col(z.cols() - 1).segment(at, count) = residual.segment(first, count);
+		at += count;
+	}
+	at = 0;
+	for (const auto &[first, count] : pieces) { /* an outlier is as if it were predicted: of no weight in the sums */
+		for (Index i = 0; i < count; i++)
+			if (problem.excluded[size_t(first + i)])
+				z.row(at + i).setZero();
+		at += count;
+	}
 	return z;
-}
-
-/* Orthonormal columns for those that are independent; the last column stays last. */
-MatrixXd independent(const MatrixXd &z)
-{
-	const Index q = z.cols() - 1;
-	if (q == 0)
-		return z;
-	const MatrixXd gram = z.leftCols(q).transpose() * z.leftCols(q);
-	const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
-	std::vector<Index> kept;
-	for (Index j = 0; j < q; j++)
-		if (eigen.eigenvalues()[j] > 1e-7 * eigen.eigenvalues()[q - 1])
-			kept.push_back(j);
-	MatrixXd turn(q, Index(kept.size()));
-	for (size_t j = 0; j < kept.size(); j++)
-		turn.col(Index(j)) = eigen.eigenvectors().col(kept[j]) / std::sqrt(eigen.eigenvalues()[kept[j]]);
-	MatrixXd result(z.rows(), turn.cols() + 1);
-	result.leftCols(turn.cols()).noalias() = z.leftCols(q) * turn;
-	result.rightCols(1) = z.rightCols(1);
-	return result;
 }
 
 /* Sums of products of the rows with themselves, with the row before, of the rows before; and of the first rows. */
@@ -80,7 +63,8 @@ Products products_of(const Problem &problem, size_t output, const MatrixXd &z)
 {
 	const Index q = z.cols();
 	Products p{MatrixXd::Zero(q, q), MatrixXd::Zero(q, q), MatrixXd::Zero(q, q), MatrixXd::Zero(q, q), z.rows(), 0};
-	p.now.noalias() = z.transpose() * z;
+	p.now.selfadjointView<Eigen::Lower>().rankUpdate(z.transpose());
+	p.now.triangularView<Eigen::StrictlyUpper>() = p.now.transpose();
 	p.before = p.now;
 	Index at = 0;
 	for (const Run &run : problem.runs) {
@@ -95,6 +79,33 @@ Products products_of(const Problem &problem, size_t output, const MatrixXd &z)
 	}
 	p.now -= p.first; /* rows that have one before them */
 	return p;
+}
+
+/* Turns z into orthonormal columns, as many as are independent, and the last one, which stays: z times the result. */
+MatrixXd independent(const Products &p)
+{
+	const Index q = p.now.cols() - 1;
+	MatrixXd turn = MatrixXd::Ones(1, 1);
+	if (q == 0)
+		return turn;
+	const MatrixXd gram = (p.now + p.first).topLeftCorner(q, q);
+	const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
+	std::vector<Index> kept;
+	for (Index j = 0; j < q; j++)
+		if (eigen.eigenvalues()[j] > 1e-7 * eigen.eigenvalues()[q - 1])
+			kept.push_back(j);
+	turn = MatrixXd::Zero(q + 1, Index(kept.size()) + 1);
+	for (size_t j = 0; j < kept.size(); j++)
+		turn.col(Index(j)).head(q) = eigen.eigenvectors().col(kept[j]) / std::sqrt(eigen.eigenvalues()[kept[j]]);
+	turn(q, turn.cols() - 1) = 1;
+	return turn;
+}
+
+/* The same sums of z times `turn`. */
+Products turned(const Products &p, const MatrixXd &turn)
+{
+	auto of = [&](const MatrixXd &sums) { return MatrixXd(turn.transpose() * sums * turn); };
+	return {of(p.now), of(p.before), of(p.cross), of(p.first), p.n, p.runs};
 }
 
 /* −2 × restricted log likelihood of an AR(1) process, and what the regression then gives. */
@@ -116,14 +127,14 @@ double restricted(const Products &p, double phi, double *square, VectorXd *coeff
 double best_phi(const Products &p)
 {
 	double best = 0, least = INFINITY, square;
-	for (double u = -1.0; u <= 3.8; u += 0.2) { /* φ = tanh u up to 0.999 */
+	for (double u = -1.0; u <= 3.8; u += 0.4) { /* φ = tanh u up to 0.999 */
 		const double cost = restricted(p, std::tanh(u), &square, nullptr);
 		if (cost < least) {
 			least = cost;
 			best = u;
 		}
 	}
-	for (double step = 0.1; step > 2e-3; step /= 2)
+	for (double step = 0.2; step > 2e-3; step /= 2)
 		for (const double u : {best - step, best + step}) {
 			const double cost = restricted(p, std::tanh(u), &square, nullptr);
 			if (cost < least) {
@@ -195,29 +206,30 @@ double spread_of(const std::vector<double> &a)
 
 } // namespace
 
-Noise estimate_noise(const Problem &problem, const VectorXd &y, const MatrixXd &columns, VectorXd &left)
+Noise estimate_noise(const Problem &problem, const VectorXd &y, const std::vector<VectorXd> &columns, VectorXd &left)
 {
 	Noise noise;
-	VectorXd residual = problem.measured - y;
-	MatrixXd x = columns;
-	for (Index i = 0; i < residual.size(); i++)
-		if (problem.excluded[size_t(i)]) { /* as if it were predicted: of no weight in the sums */
-			residual[i] = 0;
-			x.row(i).setZero();
-		}
+	const VectorXd residual = problem.measured - y;
 	left = residual;
+	for (Index i = 0; i < left.size(); i++)
+		if (problem.excluded[size_t(i)])
+			left[i] = 0;
 	for (size_t o = 0; o < problem.output_count; o++) {
 		if (!problem.outputs[o])
 			continue;
-		const MatrixXd z = independent(stack_of(problem, o, residual, x));
-		const Products p = products_of(problem, o, z);
+		const MatrixXd z = stack_of(problem, o, residual, columns);
+		const Products sums = products_of(problem, o, z);
+		const MatrixXd turn = independent(sums);
+		const Products p = turned(sums, turn);
 		double phi = p.n > 30 ? best_phi(p) : 0;
 		if (std::abs(phi) < 2.5 / std::sqrt(double(p.n))) /* not to be told from white noise */
 			phi = 0;
 		double square;
 		VectorXd b;
 		restricted(p, phi, &square, &b);
-		const VectorXd e = z.rightCols(1) - z.leftCols(b.size()) * b;
+		VectorXd weight = -(turn.leftCols(b.size()) * b); /* of the columns of z; the residual's own is 1 */
+		weight[weight.size() - 1] += 1;
+		const VectorXd e = z * weight;
 		VectorXd u = e;
 		u.tail(u.size() - 1) -= phi * e.head(e.size() - 1);
 		const std::vector<double> rest = p.n > 200 ? further(u, std::min<Index>(12, p.n / 40)) : std::vector<double>();

@@ -238,6 +238,16 @@ void Problem::mask(Eigen::Ref<VectorXd> w, Rows which) const
 			w[i] = 0;
 }
 
+VectorXd Problem::training_rows(const Eigen::Ref<const VectorXd> &w) const
+{
+	VectorXd kept(training);
+	Index at = 0;
+	for (Index i = 0; i < w.size(); i++)
+		if (trains(i, Rows::train))
+			kept[at++] = w[i];
+	return kept;
+}
+
 /* ---- parameters ---- */
 
 double Problem::ranged(const tactus_parameter &info, double value) const

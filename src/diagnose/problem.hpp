@@ -119,6 +119,8 @@ class Problem
 	/* The noise's filter over every run; the first rows of a run, outliers and gaps become 0. */
 	VectorXd whiten(const VectorXd &x) const;
 	void mask(Eigen::Ref<VectorXd> w, Rows which) const;
+	/* The values of the rows that train, close together. */
+	VectorXd training_rows(const Eigen::Ref<const VectorXd> &w) const;
 
 	/* `start` or `scale` of a parameter, which are stated for ranges of 1, in these data. */
 	double ranged(const tactus_parameter &info, double value) const;

@@ -52,8 +52,8 @@ std::vector<double> instants_of(const Problem &problem, size_t count)
 	return values;
 }
 
-std::vector<double> grid_of(const Problem &problem, const tactus_effect *effect, const tactus_search &search,
-							size_t instants)
+std::vector<double> values_of(const Problem &problem, const tactus_effect *effect, const tactus_search &search,
+							  bool coarse)
 {
 	const tactus_parameter &info = effect->parameters[search.parameter];
 	std::vector<double> values;
@@ -61,7 +61,7 @@ std::vector<double> grid_of(const Problem &problem, const tactus_effect *effect,
 	case TACTUS_SEARCH_TIME:
 		return times_of(problem, info);
 	case TACTUS_SEARCH_INSTANT:
-		return instants_of(problem, instants);
+		return instants_of(problem, coarse ? 12 : 60);
 	case TACTUS_SEARCH_VALUES:
 		for (int i = 0; i < search.count; i++)
 			values.push_back(problem.ranged(info, search.values[i]));
@@ -97,7 +97,7 @@ bool parallel(const VectorXd &a, const VectorXd &b, double cosine)
 
 /* Values of a strength to look from: one where the answer is a line, several where it is not. */
 std::vector<double> steps_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, const Part &part,
-							 size_t parameter)
+							 size_t parameter, bool coarse)
 {
 	const tactus_parameter &info = part.effect->parameters[parameter];
 	const double step = problem.ranged(info, info.start) - info.neutral;
@@ -106,7 +106,9 @@ std::vector<double> steps_of(const Problem &problem, const Hypothesis &h, const 
 		column_of(problem, h, y, part, parameter, info.neutral + step, large) && parallel(small, large, 0.99999))
 		return {info.neutral + step};
 	std::vector<double> values;
-	for (const double times : {1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0, 2.0, 4.0, 10.0, 30.0})
+	const std::vector<double> few = {0.01, 0.1, 0.4, 2, 10},
+							  many = {1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1, 2, 4, 10, 30};
+	for (const double times : coarse ? few : many)
 		for (const double sign : {1.0, -1.0})
 			add_within(values, info, info.neutral + sign * times * step);
 	return values;
@@ -121,19 +123,26 @@ const tactus_search *search_of(const tactus_effect *effect, size_t parameter)
 	return nullptr;
 }
 
+bool has_instants(const tactus_effect *effect)
+{
+	return std::any_of(effect->searches, effect->searches + effect->search_count,
+					   [](const tactus_search &search) { return search.kind == TACTUS_SEARCH_INSTANT; });
+}
+
 } // namespace
 
-std::vector<Point> points_of(const Problem &problem, const Hypothesis &h, const VectorXd &y,
-							 const tactus_effect *effect, int term, size_t instants)
+Grid grid_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, const tactus_effect *effect, int term,
+			 bool coarse, const std::function<VectorXd(const VectorXd &)> &keep)
 {
-	std::vector<Point> shapes(1), result;
+	std::vector<Point> shapes(1);
+	Grid result;
 	shapes[0].part = problem.neutral(effect);
 	for (size_t i = 0; i < effect->search_count; i++) {
 		const tactus_search &search = effect->searches[i];
 		if (term_of(effect, search.parameter) != term || effect->parameters[search.parameter].kind == TACTUS_STRENGTH)
 			continue;
 		std::vector<Point> grown;
-		for (const double value : grid_of(problem, effect, search, instants))
+		for (const double value : values_of(problem, effect, search, coarse))
 			for (Point point : shapes) {
 				point.part.value[search.parameter] = value;
 				if (effect->parameters[search.parameter].kind != TACTUS_CONSTANT)
@@ -152,16 +161,16 @@ std::vector<Point> points_of(const Problem &problem, const Hypothesis &h, const 
 				continue;
 			const tactus_search *own = search_of(effect, p);
 			const bool line = std::find(lines.begin(), lines.end(), p) != lines.end();
-			const std::vector<double> steps = own    ? grid_of(problem, effect, *own, instants)
+			const std::vector<double> steps = own    ? values_of(problem, effect, *own, coarse)
 											  : line ? std::vector<double>{problem.ranged(info, info.start)}
-													 : steps_of(problem, h, y, shape.part, p);
+													 : steps_of(problem, h, y, shape.part, p, coarse);
 			VectorXd column;
 			if (steps.size() == 1 && !own) {
 				if (!line)
 					lines.push_back(p);
 				if (column_of(problem, h, y, shape.part, p, steps[0], column)) {
 					together.strengths.push_back(p);
-					columns.push_back(column);
+					columns.push_back(keep(column));
 				}
 				continue;
 			}
@@ -169,19 +178,45 @@ std::vector<Point> points_of(const Problem &problem, const Hypothesis &h, const 
 				if (column_of(problem, h, y, shape.part, p, value, column)) {
 					Point alone = shape;
 					alone.strengths = {p};
-					alone.columns = column;
+					alone.first = Index(result.columns.size());
+					result.columns.push_back(keep(column));
 					alone.part.value[p] = value; /* where the column was taken: scored as a start */
-					result.push_back(std::move(alone));
+					result.points.push_back(std::move(alone));
 				}
 		}
 		if (columns.empty())
 			continue;
-		together.columns.resize(problem.rows(), Index(columns.size()));
-		for (size_t j = 0; j < columns.size(); j++)
-			together.columns.col(Index(j)) = columns[j];
-		result.push_back(std::move(together));
+		together.first = Index(result.columns.size());
+		std::move(columns.begin(), columns.end(), std::back_inserter(result.columns));
+		result.points.push_back(std::move(together));
 	}
 	return result;
+}
+
+Shelf::Shelf(const Problem &p, Hypothesis around) : problem(p), hypothesis(std::move(around))
+{
+	problem.simulate(hypothesis, y);
+}
+
+const Shelf::Term &Shelf::term(const tactus_effect *effect, int number) const
+{
+	const auto [at, made] = terms.try_emplace({effect, number});
+	Term &term = at->second;
+	if (!made)
+		return term;
+	Grid grid = grid_of(problem, hypothesis, y, effect, number, false,
+						[this](const VectorXd &column) { return problem.training_rows(problem.whiten(column)); });
+	term.points = std::move(grid.points);
+	term.columns.resize(problem.training, Index(grid.columns.size()));
+	for (size_t j = 0; j < grid.columns.size(); j++) {
+		term.columns.col(Index(j)) = grid.columns[j];
+		grid.columns[j].resize(0);
+	}
+	for (const Point &point : term.points) {
+		const auto columns = term.columns.middleCols(point.first, Index(point.strengths.size()));
+		term.gram.emplace_back(columns.transpose() * columns);
+	}
+	return term;
 }
 
 /* ---- scoring ---- */
@@ -190,22 +225,13 @@ std::vector<Point> points_of(const Problem &problem, const Hypothesis &h, const 
 struct Screen::State {
 	VectorXd residual;
 	MatrixXd q;
-	double parameters = 0;
 };
 
-Screen::Screen(const Problem &p, const Fit &f) : problem(p), fit(f), residual(f.residual)
+Screen::Screen(const Problem &p, const Fit &f) : problem(p), fit(f), residual(problem.training_rows(f.residual))
 {
-	problem.simulate(fit.hypothesis, y);
-	problem.mask(residual, Rows::train);
-	MatrixXd j = fit.jacobian;
-	for (Index k = 0; k < j.cols(); k++) {
-		VectorXd column = j.col(k);
-		problem.mask(column, Rows::train);
-		j.col(k) = column;
-	}
 	std::vector<VectorXd> kept;
-	for (Index k = 0; k < j.cols(); k++) { /* Gram–Schmidt, twice is enough */
-		VectorXd column = j.col(k);
+	for (Index k = 0; k < fit.jacobian.cols(); k++) { /* Gram–Schmidt, twice is enough */
+		VectorXd column = problem.training_rows(fit.jacobian.col(k));
 		const double size = column.norm();
 		for (int pass = 0; pass < 2; pass++)
 			for (const VectorXd &other : kept)
@@ -213,120 +239,112 @@ Screen::Screen(const Problem &p, const Fit &f) : problem(p), fit(f), residual(f.
 		if (column.norm() > seldom * size)
 			kept.push_back(column.normalized());
 	}
-	q.resize(problem.rows(), Index(kept.size()));
+	q.resize(residual.size(), Index(kept.size()));
 	for (size_t k = 0; k < kept.size(); k++)
 		q.col(Index(k)) = kept[k];
 	residual -= q * (q.transpose() * residual);
 	square = residual.squaredNorm();
 }
 
-/* The point of a grid, and the strengths of it, that remove most; joins them to the state and to the part. */
-double Screen::add_best(State &state, const std::vector<Point> &points, Part &part) const
+namespace
 {
-	struct {
-		double gain = 0, cost = 0;
-		const Point *point = nullptr;
-		std::vector<Index> chosen;
-		VectorXd coefficients;
-		MatrixXd columns;
-	} best;
-	const double n = double(problem.training), before = state.residual.squaredNorm();
-	auto cost_of = [&](double gain, double parameters) {
-		return n * std::log(std::fmax(1 - gain / before, 1e-12)) + parameters * std::log(n);
-	};
-	for (const Point &point : points) {
-		const Index m = point.columns.cols();
-		MatrixXd c(problem.rows(), m);
-		VectorXd full(m);
-		for (Index j = 0; j < m; j++) {
-			VectorXd w = problem.whiten(point.columns.col(j));
-			problem.mask(w, Rows::train);
-			full[j] = w.norm();
-			w -= state.q * (state.q.transpose() * w);
-			c.col(j) = w;
-		}
-		const MatrixXd gram = c.transpose() * c;
-		const VectorXd b = c.transpose() * state.residual;
-		std::vector<Index> chosen;
-		VectorXd coefficients;
-		double gain = 0, cost = 0;
-		bool instants = false;
-		for (const size_t s : point.searched) {
-			const tactus_search *search = search_of(point.part.effect, s);
-			instants = instants || (search && search->kind == TACTUS_SEARCH_INSTANT);
-		}
-		const double extra = instants ? 3 : double(point.searched.size());
-		while (chosen.size() < size_t(m)) {
-			double best_gain = gain;
-			Index pick = -1;
-			VectorXd picked;
-			for (Index j = 0; j < m; j++) {
-				if (std::find(chosen.begin(), chosen.end(), j) != chosen.end() ||
-					gram(j, j) < seldom * full[j] * full[j])
-					continue;
-				std::vector<Index> trial = chosen;
-				trial.push_back(j);
-				const auto k = Index(trial.size());
-				MatrixXd g(k, k);
-				VectorXd r(k);
-				for (Index a = 0; a < k; a++) {
-					r[a] = b[trial[size_t(a)]];
-					for (Index e = 0; e < k; e++)
-						g(a, e) = gram(trial[size_t(a)], trial[size_t(e)]);
-				}
-				const double taken = point.part.value[point.strengths[size_t(j)]] -
-									 point.part.effect->parameters[point.strengths[size_t(j)]].neutral;
-				/* Where the answer is no line the column holds for the value that it was taken at, and no other. */
-				const VectorXd x = taken != 0 ? VectorXd::Constant(k, taken) : VectorXd(g.ldlt().solve(r));
-				bool inside = x.allFinite();
-				for (Index a = 0; a < k && inside; a++) {
-					const tactus_parameter &info =
-						point.part.effect->parameters[point.strengths[size_t(trial[size_t(a)])]];
-					inside = info.neutral + x[a] >= info.lower && info.neutral + x[a] <= info.upper;
-				}
-				const double gained = 2 * r.dot(x) - x.dot(g * x);
-				if (inside && gained > best_gain) {
-					best_gain = gained;
-					pick = j;
-					picked = x;
-				}
+
+/* Strengths of one point that remove most, one after the other while each is worth its while. */
+struct Choice {
+	std::vector<Index> chosen;
+	VectorXd coefficients;
+	double gain = 0, cost = 0;
+};
+
+} // namespace
+
+/* `gram` and `b`: of the columns projected off the fit's, and with the residual; `full` their squares before that. */
+static Choice choose(const Point &point, const MatrixXd &gram, const VectorXd &b, const VectorXd &full, double n,
+					 double before)
+{
+	const tactus_effect *effect = point.part.effect;
+	const bool instants = std::any_of(point.searched.begin(), point.searched.end(),
+									  [&](size_t p) { return searched(effect, p, TACTUS_SEARCH_INSTANT); });
+	const double extra = instants ? 3 : double(point.searched.size());
+	Choice best;
+	while (best.chosen.size() < size_t(b.size())) {
+		double gain = best.gain;
+		Index pick = -1;
+		VectorXd picked;
+		for (Index j = 0; j < b.size(); j++) {
+			if (std::find(best.chosen.begin(), best.chosen.end(), j) != best.chosen.end() ||
+				gram(j, j) < seldom * full[j])
+				continue;
+			std::vector<Index> trial = best.chosen;
+			trial.push_back(j);
+			const MatrixXd g = gram(trial, trial);
+			const VectorXd r = b(trial);
+			const size_t strength = point.strengths[size_t(j)];
+			const double taken = point.part.value[strength] - effect->parameters[strength].neutral;
+			/* Where the answer is no line the column holds for the value that it was taken at, and no other. */
+			const VectorXd x = taken != 0 ? VectorXd::Constant(r.size(), taken) : VectorXd(g.ldlt().solve(r));
+			bool inside = x.allFinite();
+			for (Index a = 0; a < x.size() && inside; a++) {
+				const tactus_parameter &info = effect->parameters[point.strengths[size_t(trial[size_t(a)])]];
+				inside = info.neutral + x[a] >= info.lower && info.neutral + x[a] <= info.upper;
 			}
-			if (pick < 0)
-				break;
-			const double now = cost_of(best_gain, double(chosen.size()) + 1 + extra);
-			if (!chosen.empty() && !(now < cost - 2))
-				break;
-			chosen.push_back(pick);
-			coefficients = picked;
-			gain = best_gain;
-			cost = now;
+			const double gained = 2 * r.dot(x) - x.dot(g * x);
+			if (inside && gained > gain) {
+				gain = gained;
+				pick = j;
+				picked = x;
+			}
 		}
-		if (!chosen.empty() && (best.point == nullptr || cost < best.cost)) {
-			best.gain = gain;
-			best.cost = cost;
-			best.point = &point;
-			best.chosen = chosen;
-			best.coefficients = coefficients;
-			best.columns = c;
+		if (pick < 0)
+			break;
+		const double parameters = double(best.chosen.size()) + 1 + extra;
+		const double cost = n * std::log(std::fmax(1 - gain / before, 1e-12)) + parameters * std::log(n);
+		if (!best.chosen.empty() && !(cost < best.cost - 2))
+			break;
+		best.chosen.push_back(pick);
+		best.coefficients = picked;
+		best.gain = gain;
+		best.cost = cost;
+	}
+	return best;
+}
+
+/* The point of a grid, and the strengths of it, that remove most; joins them to the state and to the part. */
+double Screen::add_best(State &state, const Shelf::Term &term, Part &part) const
+{
+	const MatrixXd shared = state.q.transpose() * term.columns;
+	const VectorXd product = term.columns.transpose() * state.residual;
+	const double n = double(problem.training), before = state.residual.squaredNorm();
+	Choice best;
+	const Point *at = nullptr;
+	for (size_t i = 0; i < term.points.size(); i++) {
+		const Point &point = term.points[i];
+		const auto m = Index(point.strengths.size());
+		const auto own = shared.middleCols(point.first, m);
+		const Choice choice = choose(point, term.gram[i] - own.transpose() * own, product.segment(point.first, m),
+									 term.gram[i].diagonal(), n, before);
+		if (!choice.chosen.empty() && (!at || choice.cost < best.cost)) {
+			best = choice;
+			at = &point;
 		}
 	}
-	if (!best.point || !(best.gain > 0))
+	if (!at || !(best.gain > 0))
 		return 0;
-	for (const size_t s : best.point->searched) {
-		part.value[s] = best.point->part.value[s];
+	for (const size_t s : at->searched) {
+		part.value[s] = at->part.value[s];
 		part.free.push_back(s);
 	}
 	for (size_t p = 0; p < part.value.size(); p++)
-		if (best.point->part.effect->parameters[p].kind == TACTUS_CONSTANT)
-			part.value[p] = best.point->part.value[p];
+		if (at->part.effect->parameters[p].kind == TACTUS_CONSTANT)
+			part.value[p] = at->part.value[p];
 	for (size_t k = 0; k < best.chosen.size(); k++) {
-		const size_t s = best.point->strengths[size_t(best.chosen[k])];
+		const size_t s = at->strengths[size_t(best.chosen[k])];
 		const tactus_parameter &info = part.effect->parameters[s];
 		part.value[s] = std::clamp(info.neutral + best.coefficients[Index(k)], info.lower, info.upper);
 		part.free.push_back(s);
-		VectorXd column = best.columns.col(best.chosen[k]);
-		state.residual -= column * best.coefficients[Index(k)];
+		VectorXd column = term.columns.col(at->first + best.chosen[k]);
 		column -= state.q * (state.q.transpose() * column);
+		state.residual -= column * best.coefficients[Index(k)];
 		if (column.norm() > 0) {
 			state.q.conservativeResize(Eigen::NoChange, state.q.cols() + 1);
 			state.q.col(state.q.cols() - 1) = column.normalized();
@@ -335,24 +353,24 @@ double Screen::add_best(State &state, const std::vector<Point> &points, Part &pa
 	return best.cost;
 }
 
-Scored Screen::score(const tactus_effect *effect) const
+Scored Screen::score(const Shelf &shelf, const tactus_effect *effect) const
 {
 	Scored result;
 	result.part = problem.neutral(effect);
-	State state{residual, q, 0};
+	State state{residual, q};
 	int terms = 1;
 	for (size_t p = 0; p < effect->parameter_count; p++)
 		terms = std::max(terms, term_of(effect, p) + 1);
 	for (int term = 0; term < terms; term++) {
-		const std::vector<Point> points = points_of(problem, fit.hypothesis, y, effect, term, 60);
 		State trial = state;
 		Part part = result.part;
-		const double before = state.residual.squaredNorm(), cost = add_best(trial, points, part);
+		const double before = state.residual.squaredNorm(), cost = add_best(trial, shelf.term(effect, term), part);
 		/* A further term must be worth its while beside the first. */
-		if (!result.part.free.empty() &&
-			(!(cost < -10) || before - trial.residual.squaredNorm() < 0.1 * (square - before)))
-			continue;
-		if (cost == 0)
+		const bool useless = cost == 0 || (!result.part.free.empty() &&
+										   (!(cost < -10) || before - trial.residual.squaredNorm() < 0.1 * (square - before)));
+		if (useless && has_instants(effect)) /* the further terms are more of the same */
+			break;
+		if (useless)
 			continue;
 		state = trial;
 		result.part = part;
@@ -376,13 +394,14 @@ Part Screen::refine(const tactus_effect *effect) const
 	const double n = double(problem.training);
 	double best = 3 * std::log(n);
 	size_t pick = SIZE_MAX;
+	VectorXd y;
+	problem.simulate(fit.hypothesis, y);
 	for (size_t p = 0; p < effect->parameter_count; p++) {
 		const tactus_parameter &info = effect->parameters[p];
 		if (!problem.acts(info) || std::find(part.free.begin(), part.free.end(), p) != part.free.end() ||
 			std::find(terms.begin(), terms.end(), term_of(effect, p)) == terms.end())
 			continue;
-		const tactus_search *search = search_of(effect, p);
-		if (search && search->kind == TACTUS_SEARCH_INSTANT)
+		if (instant(effect, p))
 			continue;
 		Hypothesis moved = fit.hypothesis;
 		double &value = moved.parts[k].value[p];
@@ -392,8 +411,7 @@ Part Screen::refine(const tactus_effect *effect) const
 		if (value == from || !problem.simulate(moved, column))
 			continue;
 		const double change = value - from;
-		column = problem.whiten(column - y);
-		problem.mask(column, Rows::train);
+		column = problem.training_rows(problem.whiten(column - y));
 		const double full = column.norm();
 		column -= q * (q.transpose() * column);
 		if (!(column.norm() > 1e-4 * full))

@@ -2,6 +2,9 @@
 #ifndef TACTUS_DIAGNOSE_SCREEN_HPP
 #define TACTUS_DIAGNOSE_SCREEN_HPP
 
+#include <functional>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "diagnose/problem.hpp"
@@ -9,17 +12,50 @@
 namespace tactus::explain
 {
 
-/* A term of an effect at one choice of what is searched over a grid: a column per strength. */
+/* A term of an effect at one choice of what is searched over a grid: a column per strength, from `first` on. */
 struct Point {
 	Part part;                     /* strengths neutral, the searched parameters set */
 	std::vector<size_t> searched;  /* parameters that were set from the grid */
 	std::vector<size_t> strengths; /* one per column */
-	MatrixXd columns;              /* change of the scaled outputs per unit of the strength */
+	Index first = 0;
 };
 
-/* The grid of one term around a hypothesis that predicts y; empty if the effect has no such term. */
-std::vector<Point> points_of(const Problem &problem, const Hypothesis &h, const VectorXd &y,
-							 const tactus_effect *effect, int term, size_t instants);
+/* One term of an effect: all its points, and what they change in the scaled outputs per unit of the strength. */
+struct Grid {
+	std::vector<Point> points;
+	std::vector<VectorXd> columns;
+};
+
+/*
+ * The grid of one term around a hypothesis that predicts y, every column as `keep` makes it of the change; empty if the
+ * effect has no such term. A coarse one spans about the same space with fewer columns.
+ */
+Grid grid_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, const tactus_effect *effect, int term,
+			 bool coarse, const std::function<VectorXd(const VectorXd &)> &keep);
+
+/*
+ * Columns of every candidate around one hypothesis, whitened, of the rows that train; taken when first asked for. A
+ * screen of a larger fit looks at the same ones: what an effect changes depends little on the others, and who is fitted
+ * in the end is fitted exactly.
+ */
+class Shelf
+{
+  public:
+	struct Term {
+		std::vector<Point> points;
+		MatrixXd columns;
+		std::vector<MatrixXd> gram; /* of the columns of each point */
+	};
+
+	Shelf(const Problem &problem, Hypothesis around);
+	const Term &term(const tactus_effect *effect, int term) const;
+
+  private:
+	const Problem &problem;
+	Hypothesis hypothesis;
+	VectorXd y;
+	mutable std::map<std::pair<const tactus_effect *, int>, Term> terms;
+};
 
 /* An effect as it would best join a fit, to first order. */
 struct Scored {
@@ -28,22 +64,21 @@ struct Scored {
 	double cost = 0; /* change of Schwarz's criterion; below 0 it is worth its parameters */
 };
 
-/* The fit's whitened columns and residual, ready to score candidates against. */
+/* The fit's columns and residual at the rows that train, ready to score candidates against. */
 class Screen
 {
   public:
 	Screen(const Problem &problem, const Fit &fit);
-	Scored score(const tactus_effect *effect) const;
+	Scored score(const Shelf &shelf, const tactus_effect *effect) const;
 	/* What more of an effect that is in the fit would help: further strengths, shapes, initial states. */
 	Part refine(const tactus_effect *effect) const;
 
   private:
 	struct State;
-	double add_best(State &state, const std::vector<Point> &points, Part &part) const;
+	double add_best(State &state, const Shelf::Term &term, Part &part) const;
 	const Problem &problem;
 	const Fit &fit;
-	VectorXd y;
-	MatrixXd q;
+	MatrixXd q; /* orthonormal, what the fit's own columns span */
 	VectorXd residual;
 	double square;
 };

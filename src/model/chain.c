@@ -25,9 +25,11 @@ struct tactus_chain {
 	size_t state_size;
 	double *scratch; /* signal_count columns of `capacity` samples */
 	size_t capacity;
-	double *work[TACTUS_SIGNALS_MAX];
+	double *own[TACTUS_SIGNALS_MAX];  /* those columns */
+	double *work[TACTUS_SIGNALS_MAX]; /* what the block in hand is in: these, or the caller's where nothing writes */
 	double fill[TACTUS_SIGNALS_MAX]; /* the domain's, close at hand */
 	bool reads[TACTUS_SIGNALS_MAX];  /* signals that the caller may give */
+	bool constant[TACTUS_SIGNALS_MAX]; /* of them, those that no effect changes: only the input is changed in place */
 	bool looks_ahead;                /* an active effect does */
 	size_t count;
 	link links[];
@@ -65,8 +67,11 @@ static int reserve(tactus_chain *chain, size_t n)
 	free(chain->scratch);
 	chain->scratch = scratch;
 	chain->capacity = n;
-	for (size_t s = 0; s < chain->domain->signal_count; s++)
-		chain->work[s] = scratch + s * (n + PAD);
+	for (size_t s = 0; s < chain->domain->signal_count; s++) {
+		chain->own[s] = scratch + s * (n + PAD);
+		for (size_t i = 0; chain->constant[s] && i < n; i++)
+			chain->own[s][i] = chain->fill[s];
+	}
 	return TACTUS_OK;
 }
 
@@ -106,6 +111,7 @@ int tactus_chain_new(const tactus_domain *domain, const double *base, const tact
 		enum tactus_role role = domain->signals[s].role;
 		chain->fill[s] = domain->signals[s].fill;
 		chain->reads[s] = role != TACTUS_ROLE_INTERNAL && role != TACTUS_ROLE_OUTPUT;
+		chain->constant[s] = chain->reads[s] && role != TACTUS_ROLE_INPUT;
 	}
 	tactus_chain_set(chain, -1, base);
 	status = fill_links(chain, effects, parameters);
@@ -151,12 +157,14 @@ void tactus_chain_reset(tactus_chain *chain)
 			chain->links[k].effect->reset(chain->links[k].parameters, chain->links[k].state);
 }
 
-/* Copies what is read into the scratch columns and sets the rest to its fill. */
+/* Points to what is only read, copies what is changed, and sets the rest to its fill. */
 static void load(tactus_chain *chain, size_t first, size_t n, double *const *signal)
 {
 	for (size_t s = 0; s < chain->domain->signal_count; s++) {
 		bool given = chain->reads[s] && signal[s] != NULL;
-		double *to = chain->work[s];
+		double *to = chain->work[s] = given && chain->constant[s] ? signal[s] + first : chain->own[s];
+		if (chain->constant[s])
+			continue;
 		if (n == 1) /* a live reading: not worth a call of memcpy() */
 			*to = given ? signal[s][first] : chain->fill[s];
 		else if (given)

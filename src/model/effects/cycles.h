@@ -45,12 +45,13 @@ enum {
 	CYCLES_PEAK,   /* P */
 	CYCLES_FLOOR,  /* the valley of the output: follows V down at once and up slowly, so that nothing jumps */
 	CYCLES_SINCE,  /* seconds since the last confirmation */
-	CYCLES_STATES
+	CYCLES_KEPT,   /* of the filter */
+	CYCLES_STATES = CYCLES_KEPT + TACTUS_KEPT
 };
 
 static inline void tactus_cycles_reset(const double *p, double *state)
 {
-	state[CYCLES_LAST] = NAN;
+	state[CYCLES_LAST] = state[CYCLES_KEPT + KEPT_DT] = NAN;
 	state[CYCLES_LOSS] = p[CYCLES_INITIAL_LOSS];
 }
 
@@ -65,13 +66,13 @@ static inline void tactus_cycles_settle(const double *p, double *state, double f
 /* Peaks and valleys within this sample's interval; how much of it, in seconds, the load was being cycled. */
 static inline double tactus_cycles_active_s(const double *p, double *state, double force, double dt)
 {
-	state[CYCLES_VALLEY] = fmin(state[CYCLES_VALLEY], force);
-	state[CYCLES_PEAK] = fmax(state[CYCLES_PEAK], force);
+	state[CYCLES_VALLEY] = tactus_smaller(state[CYCLES_VALLEY], force);
+	state[CYCLES_PEAK] = tactus_larger(state[CYCLES_PEAK], force);
 	state[CYCLES_FLOOR] =
-		fmin(tactus_lowpass(state[CYCLES_FLOOR], state[CYCLES_VALLEY], dt, p[CYCLES_RELAXATION]), force);
+		tactus_smaller(tactus_lowpass(&state[CYCLES_KEPT], state[CYCLES_FLOOR], state[CYCLES_VALLEY], dt, p[CYCLES_RELAXATION]), force);
 	double amplitude = 0.5 * (state[CYCLES_PEAK] - state[CYCLES_VALLEY]);
-	double left_s = fmax(p[CYCLES_PAUSE] - state[CYCLES_SINCE], 0);
-	return amplitude > 0.5 * p[CYCLES_REVERSAL] ? fmin(dt, left_s) : 0;
+	double left_s = tactus_larger(p[CYCLES_PAUSE] - state[CYCLES_SINCE], 0);
+	return amplitude > 0.5 * p[CYCLES_REVERSAL] ? tactus_smaller(dt, left_s) : 0;
 }
 
 /* After the output of a sample, or the output would jump: has the load turned by more than h? */
@@ -79,8 +80,8 @@ static inline void tactus_cycles_confirm(const double *p, double *state, double 
 {
 	double h = p[CYCLES_REVERSAL];
 	state[CYCLES_SINCE] += dt;
-	state[CYCLES_LOW] = fmin(state[CYCLES_LOW], force);
-	state[CYCLES_HIGH] = fmax(state[CYCLES_HIGH], force);
+	state[CYCLES_LOW] = tactus_smaller(state[CYCLES_LOW], force);
+	state[CYCLES_HIGH] = tactus_larger(state[CYCLES_HIGH], force);
 	double direction = state[CYCLES_DIRECTION];
 	bool peak = direction >= 0 && state[CYCLES_HIGH] - force > h;
 	bool valley = !peak && direction <= 0 && force - state[CYCLES_LOW] > h;
@@ -108,7 +109,8 @@ static inline double tactus_cycles_sample(const double *p, double *state, double
 	if (active_s > 0)
 		state[CYCLES_LOSS] =
 			decline(p, state[CYCLES_LOSS], 0.5 * (state[CYCLES_PEAK] - state[CYCLES_VALLEY]), active_s);
-	state[CYCLES_LOSS] *= exp(-p[CYCLES_RECOVERY] * (dt - active_s));
+	if (p[CYCLES_RECOVERY] != 0)
+		state[CYCLES_LOSS] *= exp(-p[CYCLES_RECOVERY] * (dt - active_s));
 	double output = state[CYCLES_FLOOR] + (1 - state[CYCLES_LOSS]) * (force - state[CYCLES_FLOOR]);
 	tactus_cycles_confirm(p, state, force, dt);
 	return output;

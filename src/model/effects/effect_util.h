@@ -20,6 +20,17 @@
 
 #define TACTUS_SEARCHES(table) .searches = (table), .search_count = sizeof(table) / sizeof((table)[0])
 
+/* fmin() and fmax() of numbers, without the call that NaN asks for. */
+static inline double tactus_smaller(double a, double b)
+{
+	return a < b ? a : b;
+}
+
+static inline double tactus_larger(double a, double b)
+{
+	return a > b ? a : b;
+}
+
 /* An effect's memory of the clock: NaN before the first sample. */
 static inline bool tactus_first(double last_s)
 {
@@ -29,15 +40,25 @@ static inline bool tactus_first(double last_s)
 /* Seconds since the last sample, never negative; 0 for the first. A clock that steps back starts a new stretch. */
 static inline double tactus_elapsed(double *last_s, double time_s)
 {
-	double dt = tactus_first(*last_s) ? 0 : fmax(time_s - *last_s, 0);
+	double dt = tactus_first(*last_s) ? 0 : tactus_larger(time_s - *last_s, 0);
 	*last_s = time_s;
 	return dt;
 }
 
-/* One step of the first-order filter. */
-static inline double tactus_lowpass(double x, double input, double dt, double time_constant_s)
+/* What a filter keeps of exp(−dt/τ): the clock is even most of the time. NaN before the first step. */
+enum { KEPT_DT, KEPT_TAU, KEPT_VALUE, TACTUS_KEPT };
+
+/* One step of the first-order filter. Steps of the clock within a billionth are one. */
+static inline double tactus_lowpass(double *kept, double x, double input, double dt, double time_constant_s)
 {
-	return time_constant_s > 0 ? input + exp(-dt / time_constant_s) * (x - input) : input;
+	if (!(time_constant_s > 0))
+		return input;
+	if (!(fabs(dt - kept[KEPT_DT]) <= 1e-9 * dt) || time_constant_s != kept[KEPT_TAU]) {
+		kept[KEPT_DT] = dt;
+		kept[KEPT_TAU] = time_constant_s;
+		kept[KEPT_VALUE] = exp(-dt / time_constant_s);
+	}
+	return input + kept[KEPT_VALUE] * (x - input);
 }
 
 /* (t/T)^n, odd in t. */
@@ -48,7 +69,7 @@ static inline double tactus_odd_power(double ratio, double exponent)
 
 static inline double tactus_clamp(double x, double lower, double upper)
 {
-	return fmin(fmax(x, lower), upper);
+	return tactus_smaller(tactus_larger(x, lower), upper);
 }
 
 /* A complex number divided by 1 + z, in place. */

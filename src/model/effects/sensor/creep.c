@@ -3,7 +3,7 @@
 
 enum { DECADES = 4 };
 enum { AMPLITUDE, SHORTEST = DECADES, INITIAL };
-enum { LAST, FILTER, STATES = FILTER + DECADES };
+enum { LAST, FILTER, KEPT = FILTER + DECADES, STATES = KEPT + DECADES * TACTUS_KEPT };
 
 static const tactus_parameter parameters[] = {
 	{"amplitude_1", "1", "growth over the shortest time constant, as a fraction of the load", 0, 0, 10, 0.05, 0.02,
@@ -24,6 +24,8 @@ static void reset(const double *p, double *state)
 {
 	(void)p;
 	state[LAST] = NAN;
+	for (int k = 0; k < DECADES; k++)
+		state[KEPT + k * TACTUS_KEPT + KEPT_DT] = NAN;
 }
 
 /* F + Σ amplitude · lowpass(F, τ), τ one per decade. */
@@ -39,8 +41,10 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 		bool first = tactus_first(state[LAST]);
 		double dt = tactus_elapsed(&state[LAST], time[i]), tau = p[SHORTEST], sum = force[i];
 		for (int k = 0; k < DECADES; k++, tau *= 10) {
-			double *x = &state[FILTER + k];
-			*x = first ? force[i] + p[INITIAL + k] : tactus_lowpass(*x, force[i], dt, tau);
+			double *x = &state[FILTER + k], *kept = &state[KEPT + k * TACTUS_KEPT];
+			if (p[AMPLITUDE + k] == 0)
+				continue;
+			*x = first ? force[i] + p[INITIAL + k] : tactus_lowpass(kept, *x, force[i], dt, tau);
 			sum += p[AMPLITUDE + k] * *x;
 		}
 		force[i] = sum;

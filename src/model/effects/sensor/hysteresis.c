@@ -47,7 +47,7 @@ static void settle(const double *p, double *state, double force)
 /* (1 − η) F + η w + Σ weight · play: w = clamp(w, ρF, F) has no loop at F = 0; the direct weight of the plays is 1. */
 static double output(const double *p, double *state, double force)
 {
-	double low = fmin(p[RATIO] * force, force), high = fmax(p[RATIO] * force, force);
+	double held = p[RATIO] * force, low = tactus_smaller(held, force), high = tactus_larger(held, force);
 	state[FILM_STATE] = tactus_clamp(state[FILM_STATE], low, high);
 	double sum = force + p[FILM] * (state[FILM_STATE] - force);
 	for (int k = 0; k < PLAYS; k++) {

@@ -2,7 +2,7 @@
 #include "model/effects/effect_util.h"
 
 enum { TIME_CONSTANT, INITIAL };
-enum { LAST, FILTER, STATES };
+enum { LAST, FILTER, KEPT, STATES = KEPT + TACTUS_KEPT };
 
 static const tactus_parameter parameters[] = {
 	{"time_constant_s", "s", "time constant of the first-order response", 0, 0, 1, 0.03, 0.01, TACTUS_STRENGTH, -1},
@@ -13,7 +13,7 @@ static const tactus_parameter parameters[] = {
 static void reset(const double *p, double *state)
 {
 	(void)p;
-	state[LAST] = NAN;
+	state[LAST] = state[KEPT + KEPT_DT] = NAN;
 }
 
 static void process(const double *p, double *state, size_t n, double *const *signal)
@@ -27,7 +27,7 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 		}
 		bool first = tactus_first(state[LAST]);
 		double dt = tactus_elapsed(&state[LAST], time[i]);
-		state[FILTER] = first ? force[i] + p[INITIAL] : tactus_lowpass(state[FILTER], force[i], dt, p[TIME_CONSTANT]);
+		state[FILTER] = first ? force[i] + p[INITIAL] : tactus_lowpass(&state[KEPT], state[FILTER], force[i], dt, p[TIME_CONSTANT]);
 		force[i] = state[FILTER];
 	}
 }

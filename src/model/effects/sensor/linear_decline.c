@@ -16,7 +16,7 @@ static const tactus_parameter parameters[] = {
 static double decline(const double *p, double loss, double amplitude, double dt)
 {
 	double after = loss + (p[LINEAR] + p[SQUARE] * amplitude) * amplitude * dt;
-	return fmax(loss, fmin(after, p[CAP]));
+	return tactus_larger(loss, tactus_smaller(after, p[CAP]));
 }
 
 static void process(const double *p, double *state, size_t n, double *const *signal)

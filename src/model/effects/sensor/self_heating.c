@@ -2,7 +2,7 @@
 #include "model/effects/effect_util.h"
 
 enum { GAIN_G, GAIN_C, TIME_CONSTANT, INITIAL };
-enum { LAST, POWER, STATES };
+enum { LAST, POWER, KEPT, STATES = KEPT + TACTUS_KEPT };
 
 static const tactus_parameter parameters[] = {
 	{"conductance_gain_per_W", "1/W", "relative change of the conductance per watt", 0, -1e9, 1e9, 10, 5,
@@ -17,7 +17,7 @@ static const tactus_parameter parameters[] = {
 static void reset(const double *p, double *state)
 {
 	(void)p;
-	state[LAST] = NAN;
+	state[LAST] = state[KEPT + KEPT_DT] = NAN;
 }
 
 /* Gain 1 + k lowpass(V² G, τ), with rms volts in ac: V²/2 of the peak; G is that of the film before it is warmed. */
@@ -32,7 +32,7 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 		}
 		bool first = tactus_first(state[LAST]);
 		double dt = tactus_elapsed(&state[LAST], signal[SENSOR_TIME][i]);
-		state[POWER] = first ? power_W + p[INITIAL] : tactus_lowpass(state[POWER], power_W, dt, p[TIME_CONSTANT]);
+		state[POWER] = first ? power_W + p[INITIAL] : tactus_lowpass(&state[KEPT], state[POWER], power_W, dt, p[TIME_CONSTANT]);
 		*g *= 1 + p[GAIN_G] * state[POWER];
 		*c *= 1 + p[GAIN_C] * state[POWER];
 	}

@@ -24,7 +24,7 @@ static void remember(double *state, double time_s, double force)
 	state[TIMES + next] = time_s;
 	state[FORCES + next] = force;
 	state[NEXT] = (double)((next + 1) % RING);
-	state[COUNT] = fmin(state[COUNT] + 1, RING);
+	state[COUNT] = tactus_smaller(state[COUNT] + 1, RING);
 }
 
 /* Linear between two samples; two at one instant give the later. */
