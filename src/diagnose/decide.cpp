@@ -15,12 +15,12 @@ namespace tactus::explain
 namespace
 {
 
-/* Mean over standard error of what each training block says for b, in squares or in their logarithm. */
+/* Mean over standard error of what an output in each training block says for b, in squares or in their logarithm. */
 double paired_in(const Problem &problem, const std::vector<double> &a, const std::vector<double> &b, bool logarithm)
 {
 	double sum = 0, square = 0, n = 0;
 	for (size_t k = 0; k < a.size(); k++) {
-		if (problem.test[k] || (a[k] == 0 && b[k] == 0))
+		if (problem.test[k / problem.output_count] || (a[k] == 0 && b[k] == 0))
 			continue;
 		const double d = logarithm ? std::log((a[k] + 1) / (b[k] + 1)) : a[k] - b[k];
 		sum += d;
@@ -246,11 +246,12 @@ class Decider
 	}
 	std::vector<Scored> screen(const Fit &fit, bool all) const;
 	Fit best_next(const Fit &fit, const tactus_effect **effect) const;
-	bool stands(const Fit &with, const Fit &without, double removed) const;
+	bool stands(const Fit &with, const Fit &without) const;
 	Fit without(const Fit &fit, const tactus_effect *effect) const;
 	void select();
 	void prune();
 	bool challenge(Cause &cause);
+	void add_alike(Cause &cause) const;
 	void settle();
 	void adequacy();
 	void staleness();
@@ -292,8 +293,7 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 			break;
 		tried++;
 		const Fit joined = join(problem, fit, s.part);
-		if (joined.ok && stands(joined, fit, d.base.square - fit.square) &&
-			(!best.ok || merit(joined, fit) < merit(best, fit))) {
+		if (joined.ok && stands(joined, fit) && (!best.ok || merit(joined, fit) < merit(best, fit))) {
 			best = joined;
 			*effect = s.part.effect;
 		}
@@ -301,18 +301,23 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 	return best;
 }
 
-bool Decider::stands(const Fit &with, const Fit &without, double removed) const
+bool Decider::stands(const Fit &with, const Fit &without) const
 {
-	const double gain = (without.square - with.square) * earned(with, without);
 	/* A jump shows at its instant: the block that holds it cannot be foretold from the others. */
 	const auto instants = std::count_if(with.slots.begin(), with.slots.end(), [&](const Slot &slot) {
 		return slot.part >= 0 && !without.hypothesis.has(with.hypothesis.parts[size_t(slot.part)].effect) &&
 			   instant(with.hypothesis.parts[size_t(slot.part)].effect, slot.index);
 	});
 	const bool jumps = instants == 1 || instants == 2; /* more are a staircase, which must foretell */
-	return with.ok && without.cost - with.cost > limits.evidence && gain > limits.share * without.square &&
-		   gain > limits.further_share * (removed + gain) &&
-		   ((jumps && without.cost - with.cost > limits.jump && gain > limits.jump_share * without.square) ||
+	/* In one output at least it must be worth its while, beside what is left there and what the others removed. */
+	double share = 0;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const double before = without.square_of[o], gain = (before - with.square_of[o]) * earned(with, without);
+		if (gain > limits.further_share * (d.base.square_of[o] - before + gain))
+			share = std::fmax(share, gain / before);
+	}
+	return with.ok && without.cost - with.cost > limits.evidence && share > limits.share &&
+		   ((jumps && without.cost - with.cost > limits.jump && share > limits.jump_share) ||
 			paired(problem, problem.held_out(without), problem.held_out(with)) > limits.paired);
 }
 
@@ -344,7 +349,7 @@ void Decider::prune()
 		for (size_t i = 0; i < d.causes.size() && !again; i++) {
 			d.causes[i].without = d.causes.size() > 1 ? without(d.final, d.causes[i].effect) : d.base;
 			const Fit &left = d.causes[i].without;
-			if (d.causes.size() < 2 || !left.ok || stands(d.final, left, d.base.square - left.square))
+			if (d.causes.size() < 2 || !left.ok || stands(d.final, left))
 				continue;
 			d.final = Fit(left);
 			d.causes.erase(d.causes.begin() + long(i));
@@ -390,6 +395,7 @@ bool Decider::challenge(Cause &cause)
 		cause.effect = effect;
 		return true;
 	}
+	add_alike(cause);
 	std::sort(cause.rivals.begin(), cause.rivals.end(), [](const Rival &a, const Rival &b) {
 		return a.inseparable != b.inseparable ? a.inseparable : a.delta < b.delta;
 	});
@@ -397,6 +403,30 @@ bool Decider::challenge(Cause &cause)
 	if (e->twin && !(e->twin_excluded && e->twin_excluded(problem.segments.front(), evidence.metadata)))
 		cause.rivals.insert(cause.rivals.begin(), {nullptr, e->twin, d.final.cost - left.cost, false, true, {}});
 	return false;
+}
+
+/* An effect that at these parameters is the same thing under another name is no worse a name, whatever fits better. */
+void Decider::add_alike(Cause &cause) const
+{
+	const auto part = std::find_if(d.final.hypothesis.parts.begin(), d.final.hypothesis.parts.end(),
+								   [&](const Part &p) { return p.effect == cause.effect; });
+	const char *name =
+		cause.effect->alike ? cause.effect->alike(problem.segments.front(), part->value.data()) : nullptr;
+	for (size_t i = 0; name && problem.domain->effects[i]; i++) {
+		const tactus_effect *effect = problem.domain->effects[i];
+		if (strcmp(effect->name, name) != 0 || d.final.hypothesis.has(effect) || !testable(effect))
+			continue;
+		const auto known =
+			std::find_if(cause.rivals.begin(), cause.rivals.end(), [&](const Rival &r) { return r.effect == effect; });
+		if (known != cause.rivals.end()) {
+			known->inseparable = true;
+			continue;
+		}
+		const Scored scored = Screen(problem, cause.without).score(*shelf, effect);
+		const Fit other = join(problem, cause.without, scored.part);
+		if (other.ok)
+			cause.rivals.push_back({effect, name, other.cost - cause.without.cost, true, true, other.hypothesis});
+	}
 }
 
 void Decider::settle()

@@ -355,6 +355,26 @@ void Diagnosis::hold_stated(Work &work, Hypothesis &base) const
 	}
 }
 
+/*
+ * Scatter of the blocks' gradients about 0: what noise that is not quite as modelled (slower, of another size in each
+ * output, a form that does not quite fit) does to the parameters shows in how blocks disagree (Liang & Zeger 1986).
+ */
+MatrixXd block_scatter(const Problem &problem, const MatrixXd &columns, const VectorXd &residual)
+{
+	MatrixXd gradient = MatrixXd::Zero(problem.block_count, columns.cols());
+	for (const Run &run : problem.runs) {
+		int block = -1;
+		for (Index i = run.first; i < run.first + run.count; i++) {
+			block = problem.block[size_t(i)] >= 0 ? problem.block[size_t(i)] : block; /* a gap: with what was before */
+			if (block >= 0)
+				gradient.row(block) += columns.row(i) * residual[i];
+		}
+	}
+	const double n = problem.block_count, left = n - double(columns.cols());
+	return left < 8 ? MatrixXd(MatrixXd::Zero(columns.cols(), columns.cols()))
+					: MatrixXd(gradient.transpose() * gradient * (n / left));
+}
+
 void Diagnosis::explain(Work &work)
 {
 	if (work.hopeless)
@@ -435,12 +455,14 @@ void Diagnosis::explain(Work &work)
 	const Eigen::CompleteOrthogonalDecomposition<MatrixXd> normal(masked.transpose() * masked);
 	const MatrixXd covariance = normal.pseudoInverse();
 	const double variance = work.full.square / std::fmax(double(problem.rows() - j.cols()), 1);
+	const MatrixXd disagreement = covariance * block_scatter(problem, masked, work.full.residual) * covariance;
 	for (Index k = 0; k < j.cols(); k++) {
 		Hypothesis at = work.full.hypothesis;
 		const Slot &slot = work.full.slots[size_t(k)];
 		const double v = Problem::value(at, slot);
 		const bool known = masked.col(k).norm() > 0 && v > slot.info->lower && v < slot.info->upper;
-		work.errors.push_back(known ? std::sqrt(std::fmax(covariance(k, k), 0) * variance) / size[k] : NAN);
+		const double square = std::fmax(covariance(k, k) * variance, disagreement(k, k));
+		work.errors.push_back(known ? std::sqrt(std::fmax(square, 0)) / size[k] : NAN);
 	}
 }
 

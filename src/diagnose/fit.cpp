@@ -16,7 +16,10 @@ namespace tactus::explain
 namespace
 {
 
-/* Everything that Ceres asks for at one point; residuals and columns whitened and masked. */
+/*
+ * Everything that Ceres asks for at one point; residuals and columns whitened and masked. Its parameters are ours in
+ * units of their scale: with bounds, its test of the gradient is one of their size.
+ */
 class Cost : public ceres::CostFunction
 {
   public:
@@ -33,7 +36,7 @@ class Cost : public ceres::CostFunction
 		const auto k = Index(slots.size());
 		Hypothesis h = hypothesis;
 		for (size_t j = 0; j < slots.size(); j++)
-			Problem::value(h, slots[j]) = parameters[0][j];
+			Problem::value(h, slots[j]) = parameters[0][j] * slots[j].scale;
 		VectorXd y;
 		if (!problem.simulate(h, y))
 			return false;
@@ -51,7 +54,7 @@ class Cost : public ceres::CostFunction
 		for (Index j = 0; j < k; j++) {
 			VectorXd w = problem.whiten(d.col(j));
 			problem.mask(w, which);
-			d.col(j) = w;
+			d.col(j) = w * slots[size_t(j)].scale;
 		}
 		const MatrixXd t = triangle({d, r});
 		out = t.col(k);
@@ -149,13 +152,21 @@ void Problem::finish(Fit &fit, Rows which) const
 	fit.jacobian.resize(rows(), Index(fit.slots.size()));
 	for (Index j = 0; j < d.cols(); j++)
 		fit.jacobian.col(j) = whiten(d.col(j));
-	fit.square = 0;
-	Index n = 0;
-	for (Index i = 0; i < rows(); i++)
-		if (trains(i, which)) {
-			fit.square += fit.residual[i] * fit.residual[i];
-			n++;
-		}
+	double count[TACTUS_OUTPUTS_MAX] = {}, n = 0;
+	std::fill_n(fit.square_of, TACTUS_OUTPUTS_MAX, 0.0);
+	for (const Run &run : runs)
+		for (Index i = run.first; i < run.first + run.count; i++)
+			if (trains(i, which)) {
+				fit.square_of[run.output] += fit.residual[i] * fit.residual[i];
+				count[run.output]++;
+			}
+	fit.square = fit.cost = 0;
+	for (size_t o = 0; o < output_count; o++) {
+		n += count[o];
+		fit.square += fit.square_of[o];
+		if (count[o] > 0)
+			fit.cost += count[o] * std::log(std::fmax(fit.square_of[o], 1e-300) / count[o]);
+	}
 	fit.parameters = 0;
 	fit.at_bound = false;
 	for (const Slot &slot : fit.slots) {
@@ -165,7 +176,7 @@ void Problem::finish(Fit &fit, Rows which) const
 		/* An instant that is sought over the whole recording costs as much as three ordinary parameters. */
 		fit.parameters += slot.part >= 0 && instant(fit.hypothesis.parts[size_t(slot.part)].effect, slot.index) ? 3 : 1;
 	}
-	fit.cost = double(n) * std::log(std::fmax(fit.square, 1e-300) / double(n)) + fit.parameters * std::log(double(n));
+	fit.cost += fit.parameters * std::log(n);
 }
 
 Fit Problem::evaluate(const Hypothesis &h, Rows which) const
@@ -226,7 +237,7 @@ Fit Problem::fit(const Hypothesis &start, Rows which) const
 		std::vector<double> values;
 		values.reserve(moving.size());
 		for (const Slot &slot : moving)
-			values.push_back(value(result.hypothesis, slot));
+			values.push_back(value(result.hypothesis, slot) / slot.scale);
 		ceres::Problem problem;
 		auto *cost =
 			new Cost(*this, result.hypothesis, moving, which, [&](const Hypothesis &h, const VectorXd &y, MatrixXd &d) {
@@ -235,14 +246,14 @@ Fit Problem::fit(const Hypothesis &start, Rows which) const
 		problem.AddResidualBlock(cost, nullptr, values.data());
 		for (size_t j = 0; j < moving.size(); j++) {
 			if (std::isfinite(moving[j].info->lower))
-				problem.SetParameterLowerBound(values.data(), int(j), moving[j].info->lower);
+				problem.SetParameterLowerBound(values.data(), int(j), moving[j].info->lower / moving[j].scale);
 			if (std::isfinite(moving[j].info->upper))
-				problem.SetParameterUpperBound(values.data(), int(j), moving[j].info->upper);
+				problem.SetParameterUpperBound(values.data(), int(j), moving[j].info->upper / moving[j].scale);
 		}
 		ceres::Solver::Options options;
 		options.linear_solver_type = ceres::DENSE_QR;
 		options.logging_type = ceres::SILENT;
-		options.max_num_iterations = 25;
+		options.max_num_iterations = 60;
 		options.function_tolerance = 1e-7;
 		options.parameter_tolerance = 1e-8;
 		Converged converged(cost);
@@ -252,7 +263,8 @@ Fit Problem::fit(const Hypothesis &start, Rows which) const
 		if (!summary.IsSolutionUsable())
 			return result;
 		for (size_t j = 0; j < moving.size(); j++)
-			value(result.hypothesis, moving[j]) = values[j];
+			value(result.hypothesis, moving[j]) =
+				std::clamp(values[j] * moving[j].scale, moving[j].info->lower, moving[j].info->upper);
 		if (steps)
 			refine_instants(result, which);
 	}
@@ -293,16 +305,17 @@ std::vector<double> Problem::held_out(const Fit &fit) const
 		left.diagonal().array() += 1e-9;
 		shift[f] = -left.ldlt().solve(gradient[f]).cwiseQuotient(size);
 	}
-	std::vector<double> square(size_t(block_count), 0);
-	for (Index i = 0; i < rows(); i++) {
-		const int b = block[size_t(i)];
-		if (b < 0 || excluded[size_t(i)])
-			continue;
-		double r = fit.residual[i];
-		if (!test[size_t(b)])
-			r -= fit.jacobian.row(i).dot(shift[size_t(fold[size_t(b)])]);
-		square[size_t(b)] += r * r;
-	}
+	std::vector<double> square(size_t(block_count) * output_count, 0);
+	for (const Run &run : runs)
+		for (Index i = run.first; i < run.first + run.count; i++) {
+			const int b = block[size_t(i)];
+			if (b < 0 || excluded[size_t(i)])
+				continue;
+			double r = fit.residual[i];
+			if (!test[size_t(b)])
+				r -= fit.jacobian.row(i).dot(shift[size_t(fold[size_t(b)])]);
+			square[size_t(b) * output_count + run.output] += r * r;
+		}
 	return square;
 }
 

@@ -38,8 +38,7 @@ MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residua
 	Index at = 0;
 	for (const auto &[first, count] : pieces) {
 		for (size_t j = 0; j < order.size(); j++)
-			z.col(Index(j)).segment(at, count) =
-				columns[order[j].second].segment(first, count) / size[order[j].second];
+			z.col(Index(j)).segment(at, count) = columns[order[j].second].segment(first, count) / size[order[j].second];
 		z.col(z.cols() - 1).segment(at, count) = residual.segment(first, count);
 		at += count;
 	}

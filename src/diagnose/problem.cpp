@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 
 #include "core/core.h"
 
@@ -159,9 +160,11 @@ void Problem::make_blocks()
 
 void Problem::count_training()
 {
-	training = 0;
-	for (Index i = 0; i < rows(); i++)
-		training += trains(i, Rows::train);
+	training_of.assign(output_count, 0);
+	for (const Run &run : runs)
+		for (Index i = run.first; i < run.first + run.count; i++)
+			training_of[run.output] += trains(i, Rows::train);
+	training = std::accumulate(training_of.begin(), training_of.end(), Index(0));
 }
 
 bool Problem::trains(Index row, Rows which) const

@@ -63,10 +63,11 @@ struct Fit {
 	Hypothesis hypothesis;
 	std::vector<Slot> slots;
 	VectorXd residual;
-	MatrixXd jacobian;     /* of the prediction, per slot */
-	double square = 0;     /* Σ residual² over the rows that train */
-	double parameters = 0; /* an instant counts as three */
-	double cost = 0;       /* Schwarz's criterion: n log(square / n) + k log n */
+	MatrixXd jacobian;                         /* of the prediction, per slot */
+	double square = 0;                         /* Σ residual² over the rows that train */
+	double square_of[TACTUS_OUTPUTS_MAX] = {}; /* of each output */
+	double parameters = 0;                     /* an instant counts as three */
+	double cost = 0;                           /* Schwarz's criterion: Σ n log(square / n) + k log n, n per output */
 	bool ok = false;
 	bool at_bound = false; /* a strength that was fitted ended at a bound */
 };
@@ -99,8 +100,9 @@ class Problem
 	bool outputs[TACTUS_OUTPUTS_MAX] = {};
 	size_t output_count = 0;
 	Noise noise;
-	std::vector<char> excluded; /* per row: an outlier */
-	Index training = 0;         /* rows that train */
+	std::vector<char> excluded;     /* per row: an outlier */
+	Index training = 0;             /* rows that train */
+	std::vector<Index> training_of; /* of them, those of each output, which follow one another */
 
 	Index rows() const
 	{
@@ -134,7 +136,10 @@ class Problem
 	Fit fit(const Hypothesis &start, Rows which) const;
 	/* Residual and derivatives where it stands, without moving. */
 	Fit evaluate(const Hypothesis &h, Rows which) const;
-	/* Held-out squares per block, training blocks left out in folds (one Gauss-Newton step each); test ones as is. */
+	/*
+	 * Held-out squares per block and output (output by output within a block), training blocks left out in folds (one
+	 * Gauss-Newton step each); test ones as is.
+	 */
 	std::vector<double> held_out(const Fit &fit) const;
 
   private:

@@ -105,8 +105,10 @@ std::string sentence(const Work &work, const tactus_effect *effect)
 	if (rms < 1e-6 * rms_of(problem, output, moved)) /* an offset */
 		rms = rms_of(problem, output, moved);
 	char ratio[64];
-	snprintf(ratio, sizeof ratio, "%.2g times the noise, %.2g %% of its range", rms / problem.noise.spread[output],
-			 100 * rms * problem.scale[output] / problem.range[output]);
+	const double times = rms / problem.noise.spread[output];
+	snprintf(ratio, sizeof ratio,
+			 times < 100 ? "%.2g times the noise, %.2g %% of its range" : "%.0f times the noise, %.2g %% of its range",
+			 times, 100 * rms * problem.scale[output] / problem.range[output]);
 	return std::string(effect->summary) + "; here it moves " + work.output_name[output] + " by " +
 		   quantity(rms * problem.scale[output], work.output_unit[output]) + " rms: " + ratio;
 }

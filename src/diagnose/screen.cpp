@@ -23,7 +23,7 @@ void add_within(std::vector<double> &values, const tactus_parameter &info, doubl
 		values.push_back(value);
 }
 
-/* Evenly in the logarithm from half a step of the clock to half the duration. */
+/* Evenly in the logarithm from a part of a step of the clock to half the duration. */
 std::vector<double> times_of(const Problem &problem, const tactus_parameter &info)
 {
 	std::vector<double> values;
@@ -32,8 +32,10 @@ std::vector<double> times_of(const Problem &problem, const tactus_parameter &inf
 		dt = std::fmin(dt, series->dt);
 		duration = std::fmax(duration, tactus_series_duration_s(series));
 	}
-	const double most = info.kind == TACTUS_STRENGTH && info.lower < 0 ? 0.05 * duration : 0.5 * duration;
-	for (double t = 0.5 * dt; t <= most && t <= info.upper && values.size() < 40; t *= 2)
+	/* A time that is itself the strength may be a small part of a step; a filter's is nothing then. */
+	const bool strength = info.kind == TACTUS_STRENGTH;
+	const double most = strength && info.lower < 0 ? 0.05 * duration : 0.5 * duration;
+	for (double t = (strength ? 0.0625 : 0.5) * dt; t <= most && t <= info.upper && values.size() < 40; t *= 2)
 		for (const double sign : {1.0, -1.0})
 			add_within(values, info, sign * t);
 	return values;
@@ -213,8 +215,14 @@ const Shelf::Term &Shelf::term(const tactus_effect *effect, int number) const
 		grid.columns[j].resize(0);
 	}
 	for (const Point &point : term.points) {
-		const auto columns = term.columns.middleCols(point.first, Index(point.strengths.size()));
-		term.gram.emplace_back(columns.transpose() * columns);
+		std::vector<MatrixXd> grams;
+		Index first = 0;
+		for (const Index count : problem.training_of) {
+			const auto own = term.columns.block(first, point.first, count, Index(point.strengths.size()));
+			grams.emplace_back(own.transpose() * own);
+			first += count;
+		}
+		term.gram.push_back(std::move(grams));
 	}
 	return term;
 }
@@ -229,9 +237,14 @@ struct Screen::State {
 
 Screen::Screen(const Problem &p, const Fit &f) : problem(p), fit(f), residual(problem.training_rows(f.residual))
 {
+	for (size_t o = 0; o < problem.output_count; o++)
+		weight.push_back(
+			1 / std::fmax(std::sqrt(fit.square_of[o] / double(std::max<Index>(problem.training_of[o], 1))), 1e-9));
+	weigh(residual);
 	std::vector<VectorXd> kept;
 	for (Index k = 0; k < fit.jacobian.cols(); k++) { /* Gram–Schmidt, twice is enough */
 		VectorXd column = problem.training_rows(fit.jacobian.col(k));
+		weigh(column);
 		const double size = column.norm();
 		for (int pass = 0; pass < 2; pass++)
 			for (const VectorXd &other : kept)
@@ -246,8 +259,24 @@ Screen::Screen(const Problem &p, const Fit &f) : problem(p), fit(f), residual(pr
 	square = residual.squaredNorm();
 }
 
+void Screen::weigh(Eigen::Ref<MatrixXd> columns) const
+{
+	Index first = 0;
+	for (size_t o = 0; o < weight.size(); o++) {
+		columns.middleRows(first, problem.training_of[o]) *= weight[o];
+		first += problem.training_of[o];
+	}
+}
+
 namespace
 {
+
+/* Products of one point's columns, projected off the fit's, with each other and with the residual, in one output. */
+struct Products {
+	MatrixXd gram;
+	VectorXd b;
+	double before, n;
+};
 
 /* Strengths of one point that remove most, one after the other while each is worth its while. */
 struct Choice {
@@ -256,16 +285,33 @@ struct Choice {
 	double gain = 0, cost = 0;
 };
 
-} // namespace
+/* Fall of Schwarz's criterion: of each output by what it loses itself. */
+double cost_of(const std::vector<Products> &outputs, const std::vector<Index> &chosen, const VectorXd &x,
+			   double parameters)
+{
+	double cost = 0, n = 0;
+	for (const Products &o : outputs) {
+		const double gain = 2 * o.b(chosen).dot(x) - x.dot(o.gram(chosen, chosen) * x);
+		if (o.before > 0)
+			cost += o.n * std::log(std::fmax(1 - gain / o.before, 1e-12));
+		n += o.n;
+	}
+	return cost + parameters * std::log(n);
+}
 
-/* `gram` and `b`: of the columns projected off the fit's, and with the residual; `full` their squares before that. */
-static Choice choose(const Point &point, const MatrixXd &gram, const VectorXd &b, const VectorXd &full, double n,
-					 double before)
+/* `full`: squares of the columns before they were projected. */
+Choice choose(const Point &point, const std::vector<Products> &outputs, const VectorXd &full)
 {
 	const tactus_effect *effect = point.part.effect;
 	const bool instants = std::any_of(point.searched.begin(), point.searched.end(),
 									  [&](size_t p) { return searched(effect, p, TACTUS_SEARCH_INSTANT); });
 	const double extra = instants ? 3 : double(point.searched.size());
+	MatrixXd gram = outputs[0].gram;
+	VectorXd b = outputs[0].b;
+	for (size_t o = 1; o < outputs.size(); o++) {
+		gram += outputs[o].gram;
+		b += outputs[o].b;
+	}
 	Choice best;
 	while (best.chosen.size() < size_t(b.size())) {
 		double gain = best.gain;
@@ -297,32 +343,59 @@ static Choice choose(const Point &point, const MatrixXd &gram, const VectorXd &b
 		}
 		if (pick < 0)
 			break;
-		const double parameters = double(best.chosen.size()) + 1 + extra;
-		const double cost = n * std::log(std::fmax(1 - gain / before, 1e-12)) + parameters * std::log(n);
+		std::vector<Index> chosen = best.chosen;
+		chosen.push_back(pick);
+		const double cost = cost_of(outputs, chosen, picked, double(chosen.size()) + extra);
 		if (!best.chosen.empty() && !(cost < best.cost - 2))
 			break;
-		best.chosen.push_back(pick);
-		best.coefficients = picked;
-		best.gain = gain;
-		best.cost = cost;
+		best = {chosen, picked, gain, cost};
 	}
 	return best;
 }
 
+} // namespace
+
 /* The point of a grid, and the strengths of it, that remove most; joins them to the state and to the part. */
 double Screen::add_best(State &state, const Shelf::Term &term, Part &part) const
 {
-	const MatrixXd shared = state.q.transpose() * term.columns;
-	const VectorXd product = term.columns.transpose() * state.residual;
-	const double n = double(problem.training), before = state.residual.squaredNorm();
+	/* Per output: products of the orthonormal columns with the term's, with themselves, with the residual. */
+	std::vector<MatrixXd> shared, own;
+	std::vector<VectorXd> with_term, with_own;
+	std::vector<double> before;
+	MatrixXd all = MatrixXd::Zero(state.q.cols(), term.columns.cols());
+	Index first = 0;
+	for (size_t o = 0; o < weight.size(); o++) {
+		const Index count = problem.training_of[o];
+		const auto q_here = state.q.middleRows(first, count);
+		const auto r_here = state.residual.segment(first, count);
+		const auto c_here = term.columns.middleRows(first, count);
+		shared.emplace_back(weight[o] * (q_here.transpose() * c_here));
+		with_term.emplace_back(weight[o] * (c_here.transpose() * r_here));
+		own.emplace_back(q_here.transpose() * q_here);
+		with_own.emplace_back(q_here.transpose() * r_here);
+		before.push_back(r_here.squaredNorm());
+		all += shared.back();
+		first += count;
+	}
 	Choice best;
 	const Point *at = nullptr;
 	for (size_t i = 0; i < term.points.size(); i++) {
 		const Point &point = term.points[i];
 		const auto m = Index(point.strengths.size());
-		const auto own = shared.middleCols(point.first, m);
-		const Choice choice = choose(point, term.gram[i] - own.transpose() * own, product.segment(point.first, m),
-									 term.gram[i].diagonal(), n, before);
+		const MatrixXd projection = all.middleCols(point.first, m);
+		std::vector<Products> outputs;
+		VectorXd full = VectorXd::Zero(m);
+		for (size_t o = 0; o < weight.size(); o++) {
+			if (problem.training_of[o] == 0)
+				continue;
+			const MatrixXd gram = weight[o] * weight[o] * term.gram[i][o],
+						   cross = projection.transpose() * shared[o].middleCols(point.first, m);
+			full += gram.diagonal();
+			outputs.push_back({gram - cross - cross.transpose() + projection.transpose() * own[o] * projection,
+							   with_term[o].segment(point.first, m) - projection.transpose() * with_own[o], before[o],
+							   double(problem.training_of[o])});
+		}
+		const Choice choice = choose(point, outputs, full);
 		if (!choice.chosen.empty() && (!at || choice.cost < best.cost)) {
 			best = choice;
 			at = &point;
@@ -343,6 +416,7 @@ double Screen::add_best(State &state, const Shelf::Term &term, Part &part) const
 		part.value[s] = std::clamp(info.neutral + best.coefficients[Index(k)], info.lower, info.upper);
 		part.free.push_back(s);
 		VectorXd column = term.columns.col(at->first + best.chosen[k]);
+		weigh(column);
 		column -= state.q * (state.q.transpose() * column);
 		state.residual -= column * best.coefficients[Index(k)];
 		if (column.norm() > 0) {
@@ -366,8 +440,9 @@ Scored Screen::score(const Shelf &shelf, const tactus_effect *effect) const
 		Part part = result.part;
 		const double before = state.residual.squaredNorm(), cost = add_best(trial, shelf.term(effect, term), part);
 		/* A further term must be worth its while beside the first. */
-		const bool useless = cost == 0 || (!result.part.free.empty() &&
-										   (!(cost < -10) || before - trial.residual.squaredNorm() < 0.1 * (square - before)));
+		const bool useless =
+			cost == 0 || (!result.part.free.empty() &&
+						  (!(cost < -10) || before - trial.residual.squaredNorm() < 0.1 * (square - before)));
 		if (useless && has_instants(effect)) /* the further terms are more of the same */
 			break;
 		if (useless)
@@ -377,7 +452,6 @@ Scored Screen::score(const Shelf &shelf, const tactus_effect *effect) const
 		result.cost += cost;
 	}
 	std::sort(result.part.free.begin(), result.part.free.end());
-	result.gain = square - state.residual.squaredNorm();
 	return result;
 }
 
@@ -412,6 +486,7 @@ Part Screen::refine(const tactus_effect *effect) const
 			continue;
 		const double change = value - from;
 		column = problem.training_rows(problem.whiten(column - y));
+		weigh(column);
 		const double full = column.norm();
 		column -= q * (q.transpose() * column);
 		if (!(column.norm() > 1e-4 * full))

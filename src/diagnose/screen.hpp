@@ -44,7 +44,7 @@ class Shelf
 	struct Term {
 		std::vector<Point> points;
 		MatrixXd columns;
-		std::vector<MatrixXd> gram; /* of the columns of each point */
+		std::vector<std::vector<MatrixXd>> gram; /* of the columns of each point, per output */
 	};
 
 	Shelf(const Problem &problem, Hypothesis around);
@@ -60,11 +60,13 @@ class Shelf
 /* An effect as it would best join a fit, to first order. */
 struct Scored {
 	Part part;       /* values of what is free: where a fit should start */
-	double gain = 0; /* of the squares of the rows that train */
 	double cost = 0; /* change of Schwarz's criterion; below 0 it is worth its parameters */
 };
 
-/* The fit's columns and residual at the rows that train, ready to score candidates against. */
+/*
+ * The fit's columns and residual at the rows that train, ready to score candidates against. Each output counts in units
+ * of what the fit leaves there: what only shows in one is not hidden by a larger misfit in another.
+ */
 class Screen
 {
   public:
@@ -76,9 +78,11 @@ class Screen
   private:
 	struct State;
 	double add_best(State &state, const Shelf::Term &term, Part &part) const;
+	void weigh(Eigen::Ref<MatrixXd> columns) const;
 	const Problem &problem;
 	const Fit &fit;
-	MatrixXd q; /* orthonormal, what the fit's own columns span */
+	std::vector<double> weight; /* per output */
+	MatrixXd q;                 /* orthonormal, what the fit's own columns span */
 	VectorXd residual;
 	double square;
 };

@@ -43,7 +43,7 @@ std::string unit_of(const Work &work, const char *unit)
 
 std::string quantity(double value, const std::string &unit)
 {
-	static const char *const prefixes[] = {"f", "p", "n", "u", "m", "", "k", "M", "G"};
+	static const char *const prefixes[] = {"f", "p", "n", "µ", "m", "", "k", "M", "G"};
 	char text[64];
 	const double size = std::abs(value);
 	int power = size > 0 && std::isfinite(size) ? int(std::floor(std::log10(size) / 3)) : 0;

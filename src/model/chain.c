@@ -25,12 +25,12 @@ struct tactus_chain {
 	size_t state_size;
 	double *scratch; /* signal_count columns of `capacity` samples */
 	size_t capacity;
-	double *own[TACTUS_SIGNALS_MAX];  /* those columns */
-	double *work[TACTUS_SIGNALS_MAX]; /* what the block in hand is in: these, or the caller's where nothing writes */
-	double fill[TACTUS_SIGNALS_MAX]; /* the domain's, close at hand */
-	bool reads[TACTUS_SIGNALS_MAX];  /* signals that the caller may give */
+	double *own[TACTUS_SIGNALS_MAX];   /* those columns */
+	double *work[TACTUS_SIGNALS_MAX];  /* what the block in hand is in: these, or the caller's where nothing writes */
+	double fill[TACTUS_SIGNALS_MAX];   /* the domain's, close at hand */
+	bool reads[TACTUS_SIGNALS_MAX];    /* signals that the caller may give */
 	bool constant[TACTUS_SIGNALS_MAX]; /* of them, those that no effect changes: only the input is changed in place */
-	bool looks_ahead;                /* an active effect does */
+	bool looks_ahead;                  /* an active effect does */
 	size_t count;
 	link links[];
 };

@@ -128,6 +128,8 @@ struct tactus_effect {
 	 * parameter it is held, so that the effect can be seen; where it does not, the effect is not testable.
 	 */
 	size_t held_base;
+	/* Name of another effect of the catalogue that at these parameters leaves the same mark; NULL: none does. */
+	const char *(*alike)(const struct tactus_series *series, const double *parameters);
 	/* A cause outside this catalogue with exactly the same mark: its name, and what separates them; NULL if none. */
 	const char *twin, *twin_separated_by;
 	/* True if the recording's metadata or columns exclude the twin. NULL: nothing can. */

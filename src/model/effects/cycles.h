@@ -68,8 +68,9 @@ static inline double tactus_cycles_active_s(const double *p, double *state, doub
 {
 	state[CYCLES_VALLEY] = tactus_smaller(state[CYCLES_VALLEY], force);
 	state[CYCLES_PEAK] = tactus_larger(state[CYCLES_PEAK], force);
-	state[CYCLES_FLOOR] =
-		tactus_smaller(tactus_lowpass(&state[CYCLES_KEPT], state[CYCLES_FLOOR], state[CYCLES_VALLEY], dt, p[CYCLES_RELAXATION]), force);
+	state[CYCLES_FLOOR] = tactus_smaller(
+		tactus_lowpass(&state[CYCLES_KEPT], state[CYCLES_FLOOR], state[CYCLES_VALLEY], dt, p[CYCLES_RELAXATION]),
+		force);
 	double amplitude = 0.5 * (state[CYCLES_PEAK] - state[CYCLES_VALLEY]);
 	double left_s = tactus_larger(p[CYCLES_PAUSE] - state[CYCLES_SINCE], 0);
 	return amplitude > 0.5 * p[CYCLES_REVERSAL] ? tactus_smaller(dt, left_s) : 0;

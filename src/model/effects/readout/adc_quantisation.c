@@ -3,24 +3,48 @@
 
 #include "model/effects/effect_util.h"
 
-enum { AMPLITUDE_STEP, PHASE_STEP };
+/* Amplitude and phase in turn: the term of a parameter is its index modulo 2. */
+enum { AMPLITUDE_STEP, PHASE_STEP, AMPLITUDE_NOISE, PHASE_NOISE, AMPLITUDE_OFFSET, PHASE_OFFSET };
 
 static const tactus_parameter parameters[] = {
 	{"amplitude_step_V", "V", "step of the amplitude", 0, 0, 100, 0.01, 0.005, TACTUS_STRENGTH, 0},
 	{"phase_step_rad", "rad", "step of the phase", 0, 0, 3.2, 0.003, 0.001, TACTUS_STRENGTH, 1},
+	{"amplitude_noise_steps", "1", "rms noise before the converter, in steps: it rounds the mean's stairs", 0, 0, 0.5,
+	 0, 0.1, TACTUS_SHAPE, 0},
+	{"phase_noise_steps", "1", "the same for the phase", 0, 0, 0.5, 0, 0.1, TACTUS_SHAPE, 1},
+	{"amplitude_offset_steps", "1", "where the codes lie: 0 at multiples of the step, 0.5 between them", 0, -0.5, 0.5,
+	 0, 0.1, TACTUS_CONSTANT, 0},
+	{"phase_offset_steps", "1", "the same for the phase", 0, -0.5, 0.5, 0, 0.1, TACTUS_CONSTANT, 1},
 };
 
-static double quantise(double value, double step)
+static double normal(double z)
 {
-	return step > 0 ? step * round(value / step) : value;
+	return 0.5 * erfc(-z * 0.70710678118654752);
+}
+
+/* The mean of what the converter gives for a value with that noise: of the code below, one more for every edge. */
+static double quantise(double value, double step, double noise, double offset)
+{
+	if (!(step > 0) || !isfinite(value))
+		return value;
+	double u = value / step - offset, code = round(u);
+	if (noise > 0) {
+		int reach = (int)ceil(5 * noise + 0.5);
+		double mean = code - reach;
+		for (int k = -reach; k < reach; k++)
+			mean += normal((u - (code + k + 0.5)) / noise);
+		code = mean;
+	}
+	return step * (code + offset);
 }
 
 static void process(const double *p, double *state, size_t n, double *const *signal)
 {
 	(void)state;
 	for (size_t i = 0; i < n; i++) {
-		signal[READOUT_AMPLITUDE][i] = quantise(signal[READOUT_AMPLITUDE][i], p[AMPLITUDE_STEP]);
-		signal[READOUT_PHASE][i] = quantise(signal[READOUT_PHASE][i], p[PHASE_STEP]);
+		double *a = &signal[READOUT_AMPLITUDE][i], *phase = &signal[READOUT_PHASE][i];
+		*a = quantise(*a, p[AMPLITUDE_STEP], p[AMPLITUDE_NOISE], p[AMPLITUDE_OFFSET]);
+		*phase = quantise(*phase, p[PHASE_STEP], p[PHASE_NOISE], p[PHASE_OFFSET]);
 	}
 }
 
@@ -36,66 +60,109 @@ static int ascending(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* The step that all values are whole multiples of; 0 if there is none, or so many steps that it is no coarse one. */
-static double lattice(double *values, size_t n)
+/* |Σ exp(2πi v/step)| / n over a part of the codes: 1 if they are a lattice of that step. Sets where it lies. */
+static double concentration(const double *values, size_t n, double step, double *offset)
 {
-	double largest = 0;
+	size_t every = n / 128 + 1, count = 0;
+	double re = 0, im = 0;
+	for (size_t i = 0; i < n; i += every, count++) {
+		double angle = 2 * TACTUS_PI * (values[i] / step);
+		re += cos(angle);
+		im += sin(angle);
+	}
+	*offset = atan2(im, re) / (2 * TACTUS_PI);
+	return hypot(re, im) / (double)count;
+}
+
+/*
+ * The largest step that all values lie on a lattice of, a real converter's codes not being quite evenly spaced; 0 if
+ * there is none, or so many codes that it is no coarse one.
+ */
+static double lattice(double *values, size_t n, double *offset)
+{
+	double largest = 0, least_gap = INFINITY;
 	size_t codes = 0;
 	qsort(values, n, sizeof *values, ascending);
 	for (size_t i = 0; i < n; i++)
 		largest = fmax(largest, fabs(values[i]));
 	for (size_t i = 0; i < n; i++)
-		if (i == 0 || values[i] - values[codes - 1] > 1e-9 * largest)
+		if (i == 0 || values[i] - values[codes - 1] > 1e-9 * largest) {
+			if (codes > 0)
+				least_gap = fmin(least_gap, values[i] - values[codes - 1]);
 			values[codes++] = values[i];
-	if (codes < 3 || codes > n / 3)
-		return 0;
-	/* Gaps between codes spread evenly over all: their lower quartile is one step, unless codes are rare. */
-	double gaps[64] = {0};
-	size_t count = codes - 1 < 64 ? codes - 1 : 64;
-	for (size_t k = 0; k < count; k++) {
-		size_t i = 1 + k * (codes - 1) / count;
-		gaps[k] = values[i] - values[i - 1];
-	}
-	qsort(gaps, count, sizeof *gaps, ascending);
-	double step = gaps[count / 4];
-	/* The step that the codes are nearest to whole multiples of; a real converter's are not quite even. */
-	double off = 0;
-	for (int pass = 0; pass < 20; pass++) {
-		double product = 0, square = 0;
-		off = 0;
-		for (size_t i = 0; i < codes; i++) {
-			double whole = round(values[i] / step);
-			product += whole * values[i];
-			square += whole * whole;
-			off += pow(values[i] / step - whole, 2);
 		}
-		if (!(square > 0))
-			return 0;
-		step = product / square;
+	if (codes < 8 || codes > n / 3)
+		return 0;
+	/* As fine as the farthest code can tell steps apart. */
+	double finest = 0.15 * least_gap / (values[codes - 1] - values[0]), best = 0, found = 0, at;
+	if (finest < 1e-6)
+		return 0;
+	for (double step = 1.6 * least_gap; step > 0.3 * least_gap; step *= 1 - finest) {
+		double r = concentration(values, codes, step, &at);
+		if (r > 0.6 && r > 1.05 * best) {
+			best = r;
+			found = step;
+		}
 	}
-	return sqrt(off / (double)codes) < 0.2 ? step : 0;
+	/* Near it, the one where they are closest together. */
+	double centre = found;
+	for (double k = -8; found > 0 && k <= 8; k++) {
+		double step = centre * (1 + 0.1 * k * finest), r = concentration(values, codes, step, &at);
+		if (r > best) {
+			best = r;
+			found = step;
+		}
+	}
+	if (found > 0) {
+		concentration(values, codes, found, offset);
+		/* With all of them, by least squares: their numbers are known now. */
+		double n1 = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+		for (size_t i = 0; i < codes; i++, n1++) {
+			double whole = round(values[i] / found - *offset);
+			sx += whole;
+			sy += values[i];
+			sxx += whole * whole;
+			sxy += whole * values[i];
+		}
+		double slope = (n1 * sxy - sx * sy) / (n1 * sxx - sx * sx);
+		if (fabs(slope - found) < finest * found) {
+			*offset = (sy - slope * sx) / n1 / slope;
+			found = slope;
+		}
+		*offset -= round(*offset);
+	}
+	return found;
 }
 
 static size_t propose(const tactus_series *series, size_t parameter, double *values, size_t most)
 {
-	const double *reading = series->signal[parameter == PHASE_STEP ? READOUT_PHASE : READOUT_AMPLITUDE];
+	const double *reading = series->signal[parameter % 2 == PHASE_STEP ? READOUT_PHASE : READOUT_AMPLITUDE];
 	double *sorted = reading && most > 0 ? malloc((series->n + 1) * sizeof *sorted) : NULL;
+	double offset = 0, step = 0;
 	size_t n = 0;
 	for (size_t i = 0; sorted && i < series->n; i++)
 		if (!isnan(reading[i]))
 			sorted[n++] = reading[i];
-	values[0] = sorted && n > 8 ? lattice(sorted, n) : 0;
+	if (sorted && n > 8)
+		step = lattice(sorted, n, &offset);
 	free(sorted);
-	return values[0] > 0;
+	if (!(step > 0))
+		return 0;
+	values[0] = parameter < AMPLITUDE_NOISE ? step : fabs(offset) < 0.02 ? 0 : offset;
+	return 1;
 }
 
 static int term(size_t parameter)
 {
-	return (int)parameter;
+	return (int)(parameter % 2);
 }
 
 static const tactus_search searches[] = {{AMPLITUDE_STEP, TACTUS_SEARCH_EXACT, 0, {0}},
-										 {PHASE_STEP, TACTUS_SEARCH_EXACT, 0, {0}}};
+										 {PHASE_STEP, TACTUS_SEARCH_EXACT, 0, {0}},
+										 {AMPLITUDE_NOISE, TACTUS_SEARCH_VALUES, 4, {0, 0.1, 0.2, 0.4}},
+										 {PHASE_NOISE, TACTUS_SEARCH_VALUES, 4, {0, 0.1, 0.2, 0.4}},
+										 {AMPLITUDE_OFFSET, TACTUS_SEARCH_PROPOSED, 0, {0}},
+										 {PHASE_OFFSET, TACTUS_SEARCH_PROPOSED, 0, {0}}};
 
 const struct tactus_effect tactus_effect_readout_adc_quantisation = {
 	.name = "adc-quantisation",

@@ -35,7 +35,19 @@ static const char *testable(const tactus_series *series)
 	return why ? why : tactus_series_duration_s(series) > 0 ? NULL : "time_s never advances";
 }
 
-static const tactus_search searches[] = {{EXPONENT, TACTUS_SEARCH_VALUES, 4, {0.3, 0.6, 1, 2}}};
+/* T is the end of the recording: there the drift is best known, whatever the power. */
+static size_t propose(const tactus_series *series, size_t parameter, double *values, size_t most)
+{
+	double end =
+		fmax(fabs(tactus_series_maximum(series, SENSOR_TIME)), fabs(tactus_series_minimum(series, SENSOR_TIME)));
+	if (parameter != DURATION || most == 0 || !(end > 0))
+		return 0;
+	values[0] = end;
+	return 1;
+}
+
+static const tactus_search searches[] = {{EXPONENT, TACTUS_SEARCH_VALUES, 4, {0.3, 0.6, 1, 2}},
+										 {DURATION, TACTUS_SEARCH_PROPOSED, 0, {0}}};
 
 const struct tactus_effect tactus_effect_sensor_drift = {
 	.name = "drift",
@@ -51,5 +63,6 @@ const struct tactus_effect tactus_effect_sensor_drift = {
 	TACTUS_PARAMETERS(parameters),
 	.process = process,
 	TACTUS_SEARCHES(searches),
+	.propose = propose,
 	.testable = testable,
 };

@@ -27,7 +27,8 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 		}
 		bool first = tactus_first(state[LAST]);
 		double dt = tactus_elapsed(&state[LAST], time[i]);
-		state[FILTER] = first ? force[i] + p[INITIAL] : tactus_lowpass(&state[KEPT], state[FILTER], force[i], dt, p[TIME_CONSTANT]);
+		state[FILTER] =
+			first ? force[i] + p[INITIAL] : tactus_lowpass(&state[KEPT], state[FILTER], force[i], dt, p[TIME_CONSTANT]);
 		force[i] = state[FILTER];
 	}
 }
@@ -41,6 +42,12 @@ static const char *testable(const tactus_series *series)
 	if (!(series->dt <= 0.3))
 		return "samples are more than 0.3 s apart: too slow for a lag below 1 s";
 	return tactus_want_force_range(series);
+}
+
+/* Within one sample there is no telling how the film got there: it is late, by whatever means. */
+static const char *alike(const tactus_series *series, const double *p)
+{
+	return p[TIME_CONSTANT] < series->dt ? "time-offset" : NULL;
 }
 
 static const tactus_search searches[] = {{TIME_CONSTANT, TACTUS_SEARCH_TIME, 0, {0}}};
@@ -61,4 +68,5 @@ const struct tactus_effect tactus_effect_sensor_lag = {
 	.process = process,
 	TACTUS_SEARCHES(searches),
 	.testable = testable,
+	.alike = alike,
 };

@@ -32,7 +32,8 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 		}
 		bool first = tactus_first(state[LAST]);
 		double dt = tactus_elapsed(&state[LAST], signal[SENSOR_TIME][i]);
-		state[POWER] = first ? power_W + p[INITIAL] : tactus_lowpass(&state[KEPT], state[POWER], power_W, dt, p[TIME_CONSTANT]);
+		state[POWER] =
+			first ? power_W + p[INITIAL] : tactus_lowpass(&state[KEPT], state[POWER], power_W, dt, p[TIME_CONSTANT]);
 		*g *= 1 + p[GAIN_G] * state[POWER];
 		*c *= 1 + p[GAIN_C] * state[POWER];
 	}

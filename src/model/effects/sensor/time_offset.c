@@ -98,6 +98,12 @@ static const char *testable(const tactus_series *series)
 	return tactus_series_distinct(series, SENSOR_FORCE, 2) < 2 ? "the load never changes" : NULL;
 }
 
+/* A lag that is over before the next sample does the same. */
+static const char *alike(const tactus_series *series, const double *p)
+{
+	return p[0] > 0 && p[0] < series->dt ? "lag" : NULL;
+}
+
 static const tactus_search searches[] = {{0, TACTUS_SEARCH_TIME, 0, {0}}};
 
 const struct tactus_effect tactus_effect_sensor_time_offset = {
@@ -115,4 +121,5 @@ const struct tactus_effect tactus_effect_sensor_time_offset = {
 	.process = process,
 	TACTUS_SEARCHES(searches),
 	.testable = testable,
+	.alike = alike,
 };
