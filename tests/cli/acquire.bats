@@ -253,6 +253,27 @@ columns() { grep -v '^#' | head -1; }
 	grep -v '^date' b.toml | cmp a -
 }
 
+@test "fit -m: a model of both readings is refitted to the dc and ac rows that it came from" {
+	tactus scan sim: --channels 1-2 -o run.csv
+	tactus fit run.csv --model forward -o both.toml -q >/dev/null
+	run --separate-stderr tactus fit -m both.toml run.csv -o again.toml --json
+	status_is 0
+	jq -e '[.fit.channels[].outputs[].column] == ["conductance_S", "capacitance_F", "conductance_S", "capacitance_F"]' <<<"$output"
+	tactus fit run.csv --model forward --json | jq -c '[.fit.channels[].outputs[] | .rmse]' >expected
+	jq -e --slurpfile expected expected '[[.fit.channels[].outputs[] | .rmse], $expected[0]] | transpose | all((.[0] / .[1] - 1 | fabs) < 1e-6)' <<<"$output"
+	tactus fit run.csv --model capacitance -o c.toml -q >/dev/null
+	tactus fit -m c.toml run.csv --json | jq -e '[.fit.channels[0].outputs[].column] == ["capacitance_F"]'
+	# Columns that name two domains: the model says which.
+	awk -F, -v OFS=, '!/^#/ { $0 = $0 OFS (n++ ? "1000" : "reference_resistance_ohm") } { print }' run.csv >two.csv
+	run --separate-stderr tactus fit two.csv
+	status_is 3
+	says --domain
+	tactus fit -m both.toml two.csv
+	run --separate-stderr tactus fit -m "$examples/model-readout.toml" run.csv
+	status_is 2
+	says "the model is of the domain readout, the recording of sensor"
+}
+
 @test "fit: real recordings of others" {
 	[ -d "$data" ] || skip "the real recordings are not at ../shared/data"
 	tactus fit "$data/tactile_cell_bare.csv" -o cell.toml
