@@ -281,6 +281,43 @@ static void fingerprint(const tactus_work *work, char text[17])
 	snprintf(text, 17, "%016llx", (unsigned long long)hash);
 }
 
+/* The mean of a signal over all series if it stays within 1 % of that; NaN if it does not, or was not recorded. */
+static double constant_of(const tactus_work *work, size_t signal)
+{
+	double low = NAN, high = NAN, sum = 0;
+	size_t n = 0;
+	for (size_t c = 0; c < work->count; c++) {
+		const double *values = work->series[c].signal[signal];
+		for (size_t i = 0; values && i < work->series[c].n; i++) {
+			if (isnan(values[i]))
+				continue;
+			low = fmin(low, values[i]);
+			high = fmax(high, values[i]);
+			sum += values[i];
+			n++;
+		}
+	}
+	double mean = sum / (double)n;
+	if (low == high)
+		return low; /* to the last bit */
+	return fmax(high - mean, mean - low) <= 0.01 * fabs(mean) ? mean : NAN;
+}
+
+/* Under which conditions the model holds: what was recorded and never changed. */
+static int note_conditions(const tactus_work *work, tactus_metadata *to)
+{
+	const tactus_domain *domain = work->series[0].domain;
+	int status = TACTUS_OK;
+	for (size_t s = 0; s < domain->signal_count && status >= 0; s++) {
+		const tactus_signal *signal = &domain->signals[s];
+		bool condition = signal->role == TACTUS_ROLE_COVARIATE || signal->role == TACTUS_ROLE_INPUT;
+		double value = condition && *signal->unit ? constant_of(work, s) : NAN; /* a channel's number is none */
+		if (!isnan(value))
+			status = tactus_metadata_set_number(to, signal->name, value);
+	}
+	return status;
+}
+
 static int note_provenance(const tactus_work *work, const char *kind_name, tactus_model *model)
 {
 	char date[32], print[17];
@@ -303,6 +340,8 @@ static int note_provenance(const tactus_work *work, const char *kind_name, tactu
 	for (size_t i = 0; i < TACTUS_COUNT(pairs) && status >= 0; i++)
 		if (pairs[i][1])
 			status = tactus_metadata_set(to, pairs[i][0], pairs[i][1]);
+	if (status >= 0)
+		status = note_conditions(work, to);
 	return status < 0 ? status : TACTUS_OK;
 }
 

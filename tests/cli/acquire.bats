@@ -274,6 +274,25 @@ columns() { grep -v '^#' | head -1; }
 	says "the model is of the domain readout, the recording of sensor"
 }
 
+@test "fit: the model keeps the conditions of its recording that stayed the same, as numbers" {
+	recording >run.csv
+	tactus fit run.csv -o m.toml -q >/dev/null
+	grep -qx 'temperature_degC = 25.0' m.toml
+	grep -qx 'drive_V = -5.0' m.toml
+	[ "$(tactus show m.toml --json | jq -c '.provenance | [.temperature_degC, .drive_V]')" = '["25","-5"]' ]
+	tactus fit -m m.toml run.csv -o again.toml -q >/dev/null
+	grep -qx 'temperature_degC = 25.0' again.toml
+	recording | awk -F, -v OFS=, 'NR > 1 { $6 = -5 - NR % 2; $7 = 25 + 0.1 * (NR % 2) } { print }' >moves.csv
+	tactus fit moves.csv -o moves.toml -q >/dev/null
+	run grep -c 'drive_V' moves.toml
+	[ "$output" = 0 ]
+	sed -n 's/^temperature_degC = //p' moves.toml | awk '{ exit !($1 > 25.04 && $1 < 25.06) }'
+	recording | cut -d, -f1-5 >unknown.csv
+	tactus fit unknown.csv -o unknown.toml -q >/dev/null
+	run grep -c 'degC\|drive' unknown.toml
+	[ "$output" = 0 ]
+}
+
 @test "fit: real recordings of others" {
 	[ -d "$data" ] || skip "the real recordings are not at ../shared/data"
 	tactus fit "$data/tactile_cell_bare.csv" -o cell.toml
