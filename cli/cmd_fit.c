@@ -379,6 +379,9 @@ static int run(struct cli *cli)
 		return CLI_USAGE;
 	if (file && cli_has(cli, "model"))
 		return cli_error(cli, CLI_USAGE, "--model fits a new model, -m refits one: give one of them");
+	int refused = cli_output_refuse(cli, cli_string(cli, "output-file", NULL)); /* not after a long fit */
+	if (refused)
+		return refused;
 	tactus_model *start = NULL;
 	tactus_table *recording = NULL;
 	int error = file ? tactus_model_read(file, &start) : 0;

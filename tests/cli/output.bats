@@ -37,6 +37,17 @@ prepare() {
 	done < <(writers)
 }
 
+@test "fit: a file that exists is refused before the work, not after it" {
+	echo precious >out
+	run --separate-stderr tactus fit nosuch.csv -o out
+	status_is 2
+	says "out"
+	[ -z "$output" ]
+	run --separate-stderr tactus fit nosuch.csv -o out --overwrite
+	status_is 3
+	[ "$(cat out)" = precious ]
+}
+
 @test "a full disk is status 6, on standard output and with -o" {
 	prepare
 	[ -e /dev/full ] || skip "no /dev/full"
