@@ -293,6 +293,20 @@ columns() { grep -v '^#' | head -1; }
 	[ "$output" = 0 ]
 }
 
+@test "fit --folds: that many parts are held out in turn, 2 to 32" {
+	tactus scan sim: --channels 1 --mode dc -o run.csv
+	for n in 2 5 8; do
+		tactus fit run.csv --folds $n --json | jq -c '[.fit.channels[0] | .rmse_N, .cv_rmse_N]' >$n
+	done
+	tactus fit run.csv --json | jq -c '[.fit.channels[0] | .rmse_N, .cv_rmse_N]' | cmp - 5
+	[ "$(jq '.[0]' 2)" = "$(jq '.[0]' 8)" ]
+	[ "$(jq '.[1]' 2)" != "$(jq '.[1]' 8)" ]
+	for n in 1 33 many; do
+		run --separate-stderr tactus fit run.csv --folds $n
+		status_is 2
+	done
+}
+
 @test "fit: real recordings of others" {
 	[ -d "$data" ] || skip "the real recordings are not at ../shared/data"
 	tactus fit "$data/tactile_cell_bare.csv" -o cell.toml
