@@ -9,6 +9,7 @@
 
 #include "core/core.h"
 #include "fit/fit_work.h"
+#include "model/columns.h"
 
 enum { FOLDS = 5, STARTS = 20 };
 
@@ -459,22 +460,6 @@ static int run_work(tactus_work *work, const tactus_plan *plan, const char *name
 	return status;
 }
 
-/* A model reads the columns that it names; one by the domain's own name needs no renaming, which hides the others. */
-static int columns_of_start(const tactus_table *recording, const tactus_model *start, tactus_series_options *columns)
-{
-	const char *input = start->input_name, *output = start->output_name[0];
-	if (!columns->input && input && strcmp(input, tactus_domain_signal(start->domain, TACTUS_ROLE_INPUT, 0)->name) != 0)
-		columns->input = input;
-	if (!columns->output && output && *output &&
-		strcmp(output, tactus_domain_signal(start->domain, TACTUS_ROLE_OUTPUT, 0)->name) != 0)
-		columns->output = output;
-	const tactus_domain *domain = tactus_series_domain_beside(recording, columns, start->domain);
-	if (!domain)
-		return columns->domain ? TACTUS_ERR_ARGUMENT : TACTUS_ERR_INPUT;
-	columns->domain = tactus_domain_name(domain);
-	return TACTUS_OK;
-}
-
 int tactus_fit(const tactus_table *recording, const tactus_fit_options *options, tactus_fit_result **result)
 {
 	static const tactus_fit_options defaults = {0};
@@ -491,7 +476,7 @@ int tactus_fit(const tactus_table *recording, const tactus_fit_options *options,
 		return status;
 	tactus_series_options columns = {.domain = o->domain, .input = o->input, .output = o->output};
 	if (o->start)
-		status = columns_of_start(recording, o->start, &columns);
+		status = tactus_columns_of_model(recording, o->start, &columns);
 	if (status == TACTUS_OK)
 		status = tactus_series_split(recording, &columns, &series, &count);
 	if (status < 0)

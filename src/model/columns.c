@@ -190,6 +190,21 @@ const tactus_domain *tactus_series_domain_beside(const tactus_table *recording, 
 	return found;
 }
 
+int tactus_columns_of_model(const tactus_table *recording, const tactus_model *model, tactus_series_options *options)
+{
+	const char *input = model->input_name, *output = model->output_name[0];
+	if (!options->input && input && strcmp(input, tactus_domain_signal(model->domain, TACTUS_ROLE_INPUT, 0)->name) != 0)
+		options->input = input;
+	if (!options->output && output && *output &&
+		strcmp(output, tactus_domain_signal(model->domain, TACTUS_ROLE_OUTPUT, 0)->name) != 0)
+		options->output = output;
+	const tactus_domain *domain = tactus_series_domain_beside(recording, options, model->domain);
+	if (!domain)
+		return options->domain ? TACTUS_ERR_ARGUMENT : TACTUS_ERR_INPUT;
+	options->domain = tactus_domain_name(domain);
+	return TACTUS_OK;
+}
+
 /* Before the first row the type of a foreign column is not known: its name is enough. */
 static bool has_column(const tactus_columns *columns, size_t s)
 {
