@@ -379,6 +379,9 @@ static int run(struct cli *cli)
 		return CLI_USAGE;
 	if (file && cli_has(cli, "model"))
 		return cli_error(cli, CLI_USAGE, "--model fits a new model, -m refits one: give one of them");
+	int refused = cli_output_refuse(cli, cli_string(cli, "output-file", NULL)); /* not after a long fit */
+	if (refused)
+		return refused;
 	tactus_model *start = NULL;
 	tactus_table *recording = NULL;
 	int error = file ? tactus_model_read(file, &start) : 0;
@@ -420,7 +423,9 @@ const struct cli_command cli_fit = {
 		"of both forces, weighted their inverse-variance mean (the best one only if their errors are uncorrelated: "
 		"linear takes the correlation into account); linear regresses the force on both readings; network is a 2-2-1 "
 		"network; power is conductance with a power law; forward fits all outputs of the domain. --effects adds causes "
-		"of the catalogue to a forward model; -m refits a model file.\n\n"
+		"of the catalogue to a forward model; -m refits a model file, on the columns that it names. The model file "
+		"keeps "
+		"where it came from, and which conditions (temperature_degC, drive_V, ...) stayed within 1 %.\n\n"
 		"Errors are root mean squares of estimate minus reference, in sample and held out. Held out means blocked "
 		"cross-validation: where the load cycles at least as often as there are folds, whole cycles are left out; else "
 		"whole holds (stretches in which the load stays within 1 % of its range: the steps of a staircase). A fold "

@@ -9,6 +9,7 @@
 
 #include "core/core.h"
 #include "fit/fit_work.h"
+#include "model/columns.h"
 
 enum { FOLDS = 5, STARTS = 20 };
 
@@ -281,6 +282,43 @@ static void fingerprint(const tactus_work *work, char text[17])
 	snprintf(text, 17, "%016llx", (unsigned long long)hash);
 }
 
+/* The mean of a signal over all series if it stays within 1 % of that; NaN if it does not, or was not recorded. */
+static double constant_of(const tactus_work *work, size_t signal)
+{
+	double low = NAN, high = NAN, sum = 0;
+	size_t n = 0;
+	for (size_t c = 0; c < work->count; c++) {
+		const double *values = work->series[c].signal[signal];
+		for (size_t i = 0; values && i < work->series[c].n; i++) {
+			if (isnan(values[i]))
+				continue;
+			low = fmin(low, values[i]);
+			high = fmax(high, values[i]);
+			sum += values[i];
+			n++;
+		}
+	}
+	double mean = sum / (double)n;
+	if (low == high)
+		return low; /* to the last bit */
+	return fmax(high - mean, mean - low) <= 0.01 * fabs(mean) ? mean : NAN;
+}
+
+/* Under which conditions the model holds: what was recorded and never changed. */
+static int note_conditions(const tactus_work *work, tactus_metadata *to)
+{
+	const tactus_domain *domain = work->series[0].domain;
+	int status = TACTUS_OK;
+	for (size_t s = 0; s < domain->signal_count && status >= 0; s++) {
+		const tactus_signal *signal = &domain->signals[s];
+		bool condition = signal->role == TACTUS_ROLE_COVARIATE || signal->role == TACTUS_ROLE_INPUT;
+		double value = condition && *signal->unit ? constant_of(work, s) : NAN; /* a channel's number is none */
+		if (!isnan(value))
+			status = tactus_metadata_set_number(to, signal->name, value);
+	}
+	return status;
+}
+
 static int note_provenance(const tactus_work *work, const char *kind_name, tactus_model *model)
 {
 	char date[32], print[17];
@@ -303,6 +341,8 @@ static int note_provenance(const tactus_work *work, const char *kind_name, tactu
 	for (size_t i = 0; i < TACTUS_COUNT(pairs) && status >= 0; i++)
 		if (pairs[i][1])
 			status = tactus_metadata_set(to, pairs[i][0], pairs[i][1]);
+	if (status >= 0)
+		status = note_conditions(work, to);
 	return status < 0 ? status : TACTUS_OK;
 }
 
@@ -435,11 +475,10 @@ int tactus_fit(const tactus_table *recording, const tactus_fit_options *options,
 	if (status != TACTUS_OK)
 		return status;
 	tactus_series_options columns = {.domain = o->domain, .input = o->input, .output = o->output};
-	if (o->start && !columns.input)
-		columns.input = o->start->input_name;
-	if (o->start && !columns.output && o->start->output_name[0] && o->start->output_name[0][0])
-		columns.output = o->start->output_name[0];
-	status = tactus_series_split(recording, &columns, &series, &count);
+	if (o->start)
+		status = tactus_columns_of_model(recording, o->start, &columns);
+	if (status == TACTUS_OK)
+		status = tactus_series_split(recording, &columns, &series, &count);
 	if (status < 0)
 		return status;
 	status = make_plan(o, &series[0], k, &plan);

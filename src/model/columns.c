@@ -161,24 +161,48 @@ static void fail_domain(const tactus_table *table, const tactus_series_options *
 
 const tactus_domain *tactus_series_domain(const tactus_table *recording, const tactus_series_options *options)
 {
+	return tactus_series_domain_beside(recording, options, NULL);
+}
+
+const tactus_domain *tactus_series_domain_beside(const tactus_table *recording, const tactus_series_options *options,
+												 const tactus_domain *preferred)
+{
 	static const tactus_series_options none = {0};
 	const tactus_series_options *o = options != NULL ? options : &none;
 	if (o->domain != NULL)
 		return tactus_domain_find(o->domain);
-	const tactus_domain *found = NULL, *domain;
+	const tactus_domain *found = NULL, *ambiguous = NULL, *domain;
 	for (size_t i = 0; (domain = tactus_domain_at(i)) != NULL; i++) {
 		if (!fits(recording, domain, o))
 			continue;
-		if (found != NULL) {
-			tactus_fail(TACTUS_ERR_INPUT, "the columns fit domain '%s' and domain '%s': say which with --domain",
-						found->name, domain->name);
-			return NULL;
-		}
+		if (domain == preferred)
+			return domain;
+		ambiguous = ambiguous != NULL ? ambiguous : found;
 		found = domain;
+	}
+	if (ambiguous != NULL) {
+		tactus_fail(TACTUS_ERR_INPUT, "the columns fit domain '%s' and domain '%s': say which with --domain",
+					ambiguous->name, found->name);
+		return NULL;
 	}
 	if (found == NULL)
 		fail_domain(recording, o);
 	return found;
+}
+
+int tactus_columns_of_model(const tactus_table *recording, const tactus_model *model, tactus_series_options *options)
+{
+	const char *input = model->input_name, *output = model->output_name[0];
+	if (!options->input && input && strcmp(input, tactus_domain_signal(model->domain, TACTUS_ROLE_INPUT, 0)->name) != 0)
+		options->input = input;
+	if (!options->output && output && *output &&
+		strcmp(output, tactus_domain_signal(model->domain, TACTUS_ROLE_OUTPUT, 0)->name) != 0)
+		options->output = output;
+	const tactus_domain *domain = tactus_series_domain_beside(recording, options, model->domain);
+	if (!domain)
+		return options->domain ? TACTUS_ERR_ARGUMENT : TACTUS_ERR_INPUT;
+	options->domain = tactus_domain_name(domain);
+	return TACTUS_OK;
 }
 
 /* Before the first row the type of a foreign column is not known: its name is enough. */

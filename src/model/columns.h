@@ -28,6 +28,12 @@ void tactus_columns_of_domain(const tactus_domain *domain, tactus_columns *colum
 void tactus_columns_find(const tactus_table *table, tactus_columns *columns);
 /* The domain of the options or the columns, and its columns. TACTUS_ERR_INPUT if one that is needed is missing. */
 int tactus_columns_bind(const tactus_table *table, const tactus_series_options *options, tactus_columns *columns);
+/*
+ * What the options leave open as a model says it: its columns, where they are not the domain's own (to name one of
+ * those would hide the others), and the domain that the columns tell, the model's if they fit several. That domain may
+ * be another than the model's. TACTUS_ERR_INPUT if the columns tell none.
+ */
+int tactus_columns_of_model(const tactus_table *recording, const tactus_model *model, tactus_series_options *options);
 /* TACTUS_ERR_INPUT: says that a column is missing, and what to do about it. */
 int tactus_columns_fail_missing(const tactus_columns *columns, const char *name);
 /* "FILE: ", or "" when the table came from none: what a message begins with. Valid until the next call. */

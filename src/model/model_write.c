@@ -110,6 +110,23 @@ static void put_channel(FILE *file, const tactus_model *model, const tactus_mode
 	}
 }
 
+/* Where the model came from; a condition of the recording (temperature_degC) is a number, everything else is text. */
+static void put_origin(FILE *file, const tactus_domain *domain, const char *key, const char *text)
+{
+	double number = NAN;
+	for (size_t s = 0; s < domain->signal_count; s++)
+		if (strcmp(key, domain->signals[s].name) == 0 && !tactus_parse_number(text, strlen(text), &number))
+			number = NAN;
+	if (!isnan(number)) {
+		put_fact(file, key, number);
+		return;
+	}
+	put_string(file, key);
+	fputs(" = ", file);
+	put_string(file, text);
+	fputc('\n', file);
+}
+
 static void put_model(FILE *file, const tactus_model *model)
 {
 	fprintf(file,
@@ -137,12 +154,9 @@ static void put_model(FILE *file, const tactus_model *model)
 		put_channel(file, model, &model->channels[c]);
 	if (tactus_metadata_count(model->provenance))
 		fputs("\n[provenance]\n", file);
-	for (size_t i = 0; i < tactus_metadata_count(model->provenance); i++) {
-		put_string(file, tactus_metadata_key(model->provenance, i));
-		fputs(" = ", file);
-		put_string(file, tactus_metadata_value(model->provenance, i));
-		fputc('\n', file);
-	}
+	for (size_t i = 0; i < tactus_metadata_count(model->provenance); i++)
+		put_origin(file, model->domain, tactus_metadata_key(model->provenance, i),
+				   tactus_metadata_value(model->provenance, i));
 }
 
 static int write_failed(const char *path)

@@ -37,6 +37,9 @@ typedef struct {
 
 /* The domain that a recording's columns say (CONTRACT §1), NULL with a message if none or two. */
 const tactus_domain *tactus_series_domain(const tactus_table *recording, const tactus_series_options *options);
+/* The same beside a model of the domain `preferred`: of two that the columns fit it is that one. NULL: no model. */
+const tactus_domain *tactus_series_domain_beside(const tactus_table *recording, const tactus_series_options *options,
+												 const tactus_domain *preferred);
 /*
  * Splits a recording into its series (one per channel in `sensor`, one in `readout`), an array freed with
  * tactus_series_free(). TACTUS_ERR_INPUT if a needed column is missing; TACTUS_ERR_DATA if no row is complete.

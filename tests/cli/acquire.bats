@@ -253,6 +253,60 @@ columns() { grep -v '^#' | head -1; }
 	grep -v '^date' b.toml | cmp a -
 }
 
+@test "fit -m: a model of both readings is refitted to the dc and ac rows that it came from" {
+	tactus scan sim: --channels 1-2 -o run.csv
+	tactus fit run.csv --model forward -o both.toml -q >/dev/null
+	run --separate-stderr tactus fit -m both.toml run.csv -o again.toml --json
+	status_is 0
+	jq -e '[.fit.channels[].outputs[].column] == ["conductance_S", "capacitance_F", "conductance_S", "capacitance_F"]' <<<"$output"
+	tactus fit run.csv --model forward --json | jq -c '[.fit.channels[].outputs[] | .rmse]' >expected
+	jq -e --slurpfile expected expected '[[.fit.channels[].outputs[] | .rmse], $expected[0]] | transpose | all((.[0] / .[1] - 1 | fabs) < 1e-6)' <<<"$output"
+	tactus fit run.csv --model capacitance -o c.toml -q >/dev/null
+	tactus fit -m c.toml run.csv --json | jq -e '[.fit.channels[0].outputs[].column] == ["capacitance_F"]'
+	# Columns that name two domains: the model says which.
+	awk -F, -v OFS=, '!/^#/ { $0 = $0 OFS (n++ ? "1000" : "reference_resistance_ohm") } { print }' run.csv >two.csv
+	run --separate-stderr tactus fit two.csv
+	status_is 3
+	says --domain
+	tactus fit -m both.toml two.csv
+	run --separate-stderr tactus fit -m "$examples/model-readout.toml" run.csv
+	status_is 2
+	says "the model is of the domain readout, the recording of sensor"
+}
+
+@test "fit: the model keeps the conditions of its recording that stayed the same, as numbers" {
+	recording >run.csv
+	tactus fit run.csv -o m.toml -q >/dev/null
+	grep -qx 'temperature_degC = 25.0' m.toml
+	grep -qx 'drive_V = -5.0' m.toml
+	[ "$(tactus show m.toml --json | jq -c '.provenance | [.temperature_degC, .drive_V]')" = '["25","-5"]' ]
+	tactus fit -m m.toml run.csv -o again.toml -q >/dev/null
+	grep -qx 'temperature_degC = 25.0' again.toml
+	recording | awk -F, -v OFS=, 'NR > 1 { $6 = -5 - NR % 2; $7 = 25 + 0.1 * (NR % 2) } { print }' >moves.csv
+	tactus fit moves.csv -o moves.toml -q >/dev/null
+	run grep -c 'drive_V' moves.toml
+	[ "$output" = 0 ]
+	sed -n 's/^temperature_degC = //p' moves.toml | awk '{ exit !($1 > 25.04 && $1 < 25.06) }'
+	recording | cut -d, -f1-5 >unknown.csv
+	tactus fit unknown.csv -o unknown.toml -q >/dev/null
+	run grep -c 'degC\|drive' unknown.toml
+	[ "$output" = 0 ]
+}
+
+@test "fit --folds: that many parts are held out in turn, 2 to 32" {
+	tactus scan sim: --channels 1 --mode dc -o run.csv
+	for n in 2 5 8; do
+		tactus fit run.csv --folds $n --json | jq -c '[.fit.channels[0] | .rmse_N, .cv_rmse_N]' >$n
+	done
+	tactus fit run.csv --json | jq -c '[.fit.channels[0] | .rmse_N, .cv_rmse_N]' | cmp - 5
+	[ "$(jq '.[0]' 2)" = "$(jq '.[0]' 8)" ]
+	[ "$(jq '.[1]' 2)" != "$(jq '.[1]' 8)" ]
+	for n in 1 33 many; do
+		run --separate-stderr tactus fit run.csv --folds $n
+		status_is 2
+	done
+}
+
 @test "fit: real recordings of others" {
 	[ -d "$data" ] || skip "the real recordings are not at ../shared/data"
 	tactus fit "$data/tactile_cell_bare.csv" -o cell.toml

@@ -197,6 +197,22 @@ bad() {
 	[ "$(jq -r '.metadata.columns' <<<"$output")" = 'time_s=millis/1000,adc_count=A0,force_N=Kraft [g]*0.00980665' ]
 }
 
+@test "every command reads foreign files: the values are those of the file in our own form" {
+	recording >own.csv
+	recording | sed 's/,/;/g; s/\./,/g; 1s/force_N/load_g/' >foreign.csv
+	for c in "force -m $examples/model-forward.toml" "simulate -m $examples/model-forward.toml" "convert -g 1kohm" \
+		"join own.csv --offset 0s" fit diagnose; do
+		tactus $c own.csv >expected 2>/dev/null
+		run --separate-stderr tactus $c foreign.csv --delimiter ';' --decimal-comma --columns 'force_N=load_g*1'
+		status_is 0
+		# What was mapped is in the metadata; file names differ.
+		diff <(grep -v '^#' expected | sed 's/own\.csv/foreign.csv/') <(printf '%s\n' "$output" | grep -v '^#') || fail "$c"
+	done
+	run --separate-stderr tactus show foreign.csv --delimiter ';' --decimal-comma --columns 'force_N=load_g*1' --json
+	status_is 0
+	jq -e '.rows == 80 and .domain == "sensor"' <<<"$output"
+}
+
 @test "a mapping that is wrong says which column" {
 	recording >run.csv
 	run --separate-stderr tactus show run.csv --columns force_N=load

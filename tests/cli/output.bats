@@ -37,6 +37,17 @@ prepare() {
 	done < <(writers)
 }
 
+@test "fit: a file that exists is refused before the work, not after it" {
+	echo precious >out
+	run --separate-stderr tactus fit nosuch.csv -o out
+	status_is 2
+	says "out"
+	[ -z "$output" ]
+	run --separate-stderr tactus fit nosuch.csv -o out --overwrite
+	status_is 3
+	[ "$(cat out)" = precious ]
+}
+
 @test "a full disk is status 6, on standard output and with -o" {
 	prepare
 	[ -e /dev/full ] || skip "no /dev/full"
@@ -149,6 +160,22 @@ interrupt() { # SIGNAL COMMAND…: starts it, waits for a record, sends the sign
 	[[ ${lines[0]} == "130 "*" whole"* ]] || fail "${lines[0]}"
 	run interrupt SIGTERM tactus scan sim: --realtime --channels 1 --rate 20Hz
 	[[ ${lines[0]} == "143 "*" whole"* ]] || fail "${lines[0]}"
+}
+
+@test "the second SIGINT aborts a scan that cannot end, because nobody reads what it writes" {
+	"$PYTHON" - <<-'EOP'
+		import signal, subprocess, time
+		p = subprocess.Popen(["tactus", "scan", "sim:", "--count", "1000000"], stdout=subprocess.PIPE)
+		p.stdout.read(1) # it runs; soon the pipe is full
+		def of(key): return next(l.split()[1] for l in open(f"/proc/{p.pid}/status") if l.startswith(key))
+		while of("State") != "S": time.sleep(0.01)
+		p.send_signal(signal.SIGINT)
+		deadline = time.monotonic() + 20
+		while int(of("SigCgt"), 16) & 2 and time.monotonic() < deadline: time.sleep(0.01) # until the first was taken
+		assert p.poll() is None
+		p.send_signal(signal.SIGINT)
+		assert p.wait(20) == -signal.SIGINT, p.returncode
+	EOP
 }
 
 @test "an interrupted scan keeps its file" {
