@@ -522,7 +522,11 @@ void Decider::adequacy()
 {
 	d.left = d.causes.empty() ? d.wrong : map(d.final);
 	d.bursts = bursts(d.final);
-	d.structure = !d.left.empty() || d.bursts > 0;
+	/* Steps without end are something that changes from stretch to stretch and was not recorded. */
+	d.steps = size_t(std::count_if(d.final.slots.begin(), d.final.slots.end(), [&](const Slot &slot) {
+		return slot.part >= 0 && instant(d.final.hypothesis.parts[size_t(slot.part)].effect, slot.index);
+	}));
+	d.structure = !d.left.empty() || d.bursts > 0 || d.steps >= limits.steps;
 	if (d.causes.empty())
 		return;
 	for (const Dependence &dep : d.wrong)

@@ -54,6 +54,7 @@ struct Decision {
 	std::vector<Dependence> wrong, left;
 	Moved moved;
 	bool stale = false, structure = false;
+	size_t steps = 0;  /* instants among the causes */
 	double bursts = 0; /* share of what is left that a fiftieth of the readings hold; 0: they are as noise is */
 };
 

@@ -12,6 +12,7 @@
 #include "diagnose/noise.hpp"
 #include "diagnose/report.hpp"
 #include "fit/fit_work.h"
+#include "model/columns.h"
 
 namespace tactus::explain
 {
@@ -81,12 +82,11 @@ class Diagnosis
 
 int Diagnosis::split()
 {
-	const tactus_series_options how = {options.domain  ? options.domain
-									   : options.model ? tactus_domain_name(options.model->domain)
-													   : nullptr,
-									   options.input, options.output, false};
 	for (Recording &r : recordings) {
-		const int status = tactus_series_split(r.table, &how, &r.series, &r.count);
+		tactus_series_options how = {options.domain, options.input, options.output, false};
+		int status = options.model ? tactus_columns_of_model(r.table, options.model, &how) : TACTUS_OK;
+		if (status == TACTUS_OK)
+			status = tactus_series_split(r.table, &how, &r.series, &r.count);
 		if (status != TACTUS_OK)
 			return status;
 		if (r.series->domain != recordings.front().series->domain)
@@ -355,26 +355,6 @@ void Diagnosis::hold_stated(Work &work, Hypothesis &base) const
 	}
 }
 
-/*
- * Scatter of the blocks' gradients about 0: what noise that is not quite as modelled (slower, of another size in each
- * output, a form that does not quite fit) does to the parameters shows in how blocks disagree (Liang & Zeger 1986).
- */
-MatrixXd block_scatter(const Problem &problem, const MatrixXd &columns, const VectorXd &residual)
-{
-	MatrixXd gradient = MatrixXd::Zero(problem.block_count, columns.cols());
-	for (const Run &run : problem.runs) {
-		int block = -1;
-		for (Index i = run.first; i < run.first + run.count; i++) {
-			block = problem.block[size_t(i)] >= 0 ? problem.block[size_t(i)] : block; /* a gap: with what was before */
-			if (block >= 0)
-				gradient.row(block) += columns.row(i) * residual[i];
-		}
-	}
-	const double n = problem.block_count, left = n - double(columns.cols());
-	return left < 8 ? MatrixXd(MatrixXd::Zero(columns.cols(), columns.cols()))
-					: MatrixXd(gradient.transpose() * gradient * (n / left));
-}
-
 void Diagnosis::explain(Work &work)
 {
 	if (work.hopeless)
@@ -455,7 +435,7 @@ void Diagnosis::explain(Work &work)
 	const Eigen::CompleteOrthogonalDecomposition<MatrixXd> normal(masked.transpose() * masked);
 	const MatrixXd covariance = normal.pseudoInverse();
 	const double variance = work.full.square / std::fmax(double(problem.rows() - j.cols()), 1);
-	const MatrixXd disagreement = covariance * block_scatter(problem, masked, work.full.residual) * covariance;
+	const MatrixXd disagreement = covariance * problem.scatter(masked, work.full.residual) * covariance;
 	for (Index k = 0; k < j.cols(); k++) {
 		Hypothesis at = work.full.hypothesis;
 		const Slot &slot = work.full.slots[size_t(k)];

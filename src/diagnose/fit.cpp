@@ -82,8 +82,9 @@ class Converged : public ceres::IterationCallback
 	}
 	ceres::CallbackReturnType operator()(const ceres::IterationSummary &summary) override
 	{
-		return summary.step_is_successful && cost->offset < 1e-2 ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
-																 : ceres::SOLVER_CONTINUE;
+		/* Within a hundredth of the standard errors, or creeping along by what no decision hangs on. */
+		const bool near = cost->offset < 1e-2 || (summary.iteration > 3 && summary.cost_change < 0.02);
+		return summary.step_is_successful && near ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
 	}
 
   private:
@@ -270,6 +271,22 @@ Fit Problem::fit(const Hypothesis &start, Rows which) const
 	}
 	finish(result, which);
 	return result;
+}
+
+MatrixXd Problem::scatter(const MatrixXd &columns, const VectorXd &residual) const
+{
+	MatrixXd gradient = MatrixXd::Zero(block_count, columns.cols());
+	for (const Run &run : runs) {
+		int at = -1;
+		for (Index i = run.first; i < run.first + run.count; i++) {
+			at = block[size_t(i)] >= 0 ? block[size_t(i)] : at; /* a gap: with what was before */
+			if (at >= 0)
+				gradient.row(at) += columns.row(i) * residual[i];
+		}
+	}
+	const double n = double(block_count), left = n - double(columns.cols());
+	return left < 8 ? MatrixXd(MatrixXd::Zero(columns.cols(), columns.cols()))
+					: MatrixXd(gradient.transpose() * gradient * (n / left));
 }
 
 /*

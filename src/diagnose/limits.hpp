@@ -24,6 +24,7 @@ struct Limits {
 	double far = 0.85;                  /* of a cause's evidence, below which a rival need not lose block by block */
 	double tails = 5;                   /* kurtosis of whitened readings above which they come in bursts */
 	size_t causes = 5, tried = 4;
+	size_t steps = 3; /* instants from which on they look like something that was not recorded */
 };
 inline constexpr Limits limits;
 

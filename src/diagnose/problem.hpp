@@ -132,6 +132,13 @@ class Problem
 	bool acts(const tactus_parameter &info) const;
 	static double &value(Hypothesis &h, const Slot &slot);
 
+	/*
+	 * Scatter of the blocks' gradients about 0: what noise that is not quite as modelled (slower, of another size in
+	 * each output, a form that does not quite fit) does to the parameters shows in how blocks disagree (Liang & Zeger
+	 * 1986). Rows that do not count are 0 in the columns. All 0 where there are too few blocks.
+	 */
+	MatrixXd scatter(const MatrixXd &columns, const VectorXd &residual) const;
+
 	/* The hypothesis at the least squares of whitened residuals over those rows, from where it stands. */
 	Fit fit(const Hypothesis &start, Rows which) const;
 	/* Residual and derivatives where it stands, without moving. */

@@ -1,5 +1,6 @@
 /* A decision as the caller reads it: numbers, one sentence each, arrays for pictures. */
 #include "diagnose/report.hpp"
+#include "diagnose/limits.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -319,6 +320,11 @@ const tactus_dependence *unexplained(Store &store, const Work &work, size_t *cou
 	const tactus_dependence *list = describe(store, work, d.left, d.final);
 	for (size_t i = 0; i < d.left.size(); i++)
 		result.push_back(list[i]);
+	if (d.steps >= limits.steps)
+		result.push_back(
+			{"time_s", 0, 0,
+			 store.format("%zu steps were needed: something changes from stretch to stretch that no column records",
+						  d.steps)});
 	if (d.bursts > 0)
 		result.push_back(
 			{"time_s", d.bursts, 0,
