@@ -287,9 +287,10 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 	Fit best;
 	*effect = nullptr;
 	size_t tried = 0;
-	for (const Scored &s : screen(fit, false)) {
+	const std::vector<Scored> scored = screen(fit, false);
+	for (const Scored &s : scored) {
 		if (tried == limits.tried || !(s.cost < -0.5 * limits.evidence) || s.part.free.empty() ||
-			(best.ok && s.cost > limits.hopeless * merit(best, fit)))
+			s.cost > limits.hopeless * scored.front().cost)
 			break;
 		tried++;
 		const Fit joined = join(problem, fit, s.part);
@@ -371,10 +372,16 @@ bool Decider::challenge(Cause &cause)
 	size_t tried = 0;
 	Fit better;
 	const tactus_effect *effect = nullptr;
-	for (const Scored &s : screen(left, true)) {
+	/* Seen linearly, a cause may look smaller than it is once fitted: like is compared with like. */
+	const std::vector<Scored> scored = screen(left, true);
+	double own = mine;
+	for (const Scored &s : scored)
+		if (s.part.effect == cause.effect)
+			own = std::fmax(own, s.cost);
+	for (const Scored &s : scored) {
 		if (s.part.effect == cause.effect || d.final.hypothesis.has(s.part.effect))
 			continue;
-		if (tried == limits.tried || s.part.free.empty() || !(s.cost < limits.hopeless * mine))
+		if (tried == limits.tried || s.part.free.empty() || !(s.cost < limits.hopeless * own))
 			break;
 		tried++;
 		const Fit other = join(problem, left, s.part);

@@ -258,6 +258,48 @@ survives() {
 	jq -e '.domain == "readout" and (.series | length > 0)' result.json
 }
 
+@test "the experiment that is proposed for an ambiguous recording resolves it" {
+	cp "$BATS_FILE_TMPDIR/creep.toml" .
+	tactus scan sim:creep.toml --protocol "rest 2s, hold 150N 200s" --channels 1 --mode dc -q -o once.csv
+	tactus diagnose once.csv --device sim:creep.toml --json >once.json
+	jq -e '.verdict == "ambiguous" and ([.series[0].causes[0] | .effect, .rivals[].effect] | index("creep") != null)' once.json
+	eval "$(jq -r '.series[0].next_experiment.command' once.json) --mode dc -q"
+	tactus diagnose next.csv --json >next.json
+	jq -e '.verdict == "cause-found" and [.series[0].causes[].effect] == ["creep"]' next.json
+}
+
+@test "a second cause that shows in the weaker output only is not hidden by the first" {
+	cat >two.toml <<-'EOM'
+		kind = "model"
+		format = 1
+		domain = "readout"
+		form = "forward"
+		effects = ["switch-resistance", "comparator-delay"]
+		[output.amplitude_V]
+		[output.phase_rad]
+		[base]
+		gain_resistor_ohm = 1000
+		[[channel]]
+		channel = 1
+		[channel.effect.switch-resistance]
+		resistance_ohm = 75
+		[channel.effect.comparator-delay]
+		delay_s = 2e-7
+		[channel.reading.amplitude_V]
+		residual_std = 1e-3
+		[channel.reading.phase_rad]
+		residual_std = 1e-3
+	EOM
+	awk 'BEGIN { print "time_s,channel,reference_resistance_ohm,reference_capacitance_F,frequency_Hz,drive_V"
+		split("330 1000 4700 10000 47000 100000", r); split("0 47e-12 220e-12 1e-9", c); split("0 500 2000 4000 10000 30000", f)
+		for (k = 0; k < 2; k++) for (v = 0.5; v < 3; v *= 2) for (i = 1; i <= 6; i++) for (j = 1; j <= 4; j++) for (m = 1; m <= 6; m++)
+			printf "%.2f,1,%s,%s,%s,%s\n", 0.05 * n++, r[i], c[j], f[m], v }' >loads.csv
+	tactus simulate -m two.toml --noise --seed 2 loads.csv -o two.csv
+	tactus diagnose two.csv --json >two.json
+	jq -e '.verdict == "cause-found" and ([.series[0].causes[].effect] | sort) == ["comparator-delay", "switch-resistance"]' two.json
+	jq -e '[.series[0].causes[].parameters[] | select(.name == "delay_s") | .value] | all(. > 1.9e-7 and . < 2.1e-7)' two.json
+}
+
 # ---- what is refused ------------------------------------------------------------------------------------------------
 
 @test "an estimator is status 2; what cannot be read, or is of another domain, says so" {

@@ -297,6 +297,34 @@ static void quantisation_rounds_to_its_steps(void **unused)
 	}
 }
 
+/* Codes between the multiples of the step; noise before the converter rounds the mean's stairs: at an edge it is
+ * halfway, and with half a step of it nothing is left of them. */
+static void quantisation_of_noisy_values_is_a_mean(void **unused)
+{
+	(void)unused;
+	for (double r = 300; r < 1e5; r *= 1.37) {
+		double a, ph, a0, ph0;
+		bench between = {0}, noisy = {0}, bare = {0};
+		read_one(&bare, r, 5e-10, 4000, 3, &a0, &ph0);
+		add(&between, &tactus_effect_readout_adc_quantisation, "amplitude_step_V", 0.05);
+		rig_set(between.effect[0], between.p[0], "amplitude_offset_steps", 0.5);
+		read_one(&between, r, 5e-10, 4000, 3, &a, &ph);
+		rig_near(remainder(a - 0.025, 0.05), 0, 1e-14 * a);
+		/* A step whose edge lies at the value: half of the readings are above. */
+		add(&noisy, &tactus_effect_readout_adc_quantisation, "amplitude_step_V", a0 / 10.5);
+		rig_set(noisy.effect[0], noisy.p[0], "amplitude_noise_steps", 0.1);
+		read_one(&noisy, r, 5e-10, 4000, 3, &a, &ph);
+		rig_near(a, a0, 1e-9 * a0);
+		/* A tenth of a step off the edge, one standard deviation: 84 % are above. */
+		rig_set(noisy.effect[0], noisy.p[0], "amplitude_step_V", a0 / 10.6);
+		read_one(&noisy, r, 5e-10, 4000, 3, &a, &ph);
+		rig_near(a / (a0 / 10.6), 10.841344746, 1e-8);
+		rig_set(noisy.effect[0], noisy.p[0], "amplitude_noise_steps", 0.5);
+		read_one(&noisy, r, 5e-10, 4000, 3, &a, &ph);
+		rig_near(a, a0, 0.01 * a0 / 10.6);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -313,6 +341,7 @@ int main(void)
 		cmocka_unit_test(an_averaging_rectifier_reads_the_mean_of_the_clipped_sine),
 		cmocka_unit_test(settling_mixes_loads_that_follow_each_other),
 		cmocka_unit_test(quantisation_rounds_to_its_steps),
+		cmocka_unit_test(quantisation_of_noisy_values_is_a_mean),
 	};
 	return cmocka_run_group_tests_name("effects: readout", tests, NULL, NULL);
 }

@@ -2,7 +2,7 @@
 #include "model/effects/effect_util.h"
 
 enum { DECADES = 4 };
-enum { AMPLITUDE, SHORTEST = DECADES, INITIAL };
+enum { AMPLITUDE, SHORTEST = DECADES, INITIAL, FRESH = INITIAL + DECADES };
 enum { LAST, FILTER, KEPT = FILTER + DECADES, STATES = KEPT + DECADES * TACTUS_KEPT };
 
 static const tactus_parameter parameters[] = {
@@ -18,6 +18,8 @@ static const tactus_parameter parameters[] = {
 	{"initial_excess_10_N", "N", "the same for 10 times the shortest", 0, -1e9, 1e9, -0.5, 0.5, TACTUS_INITIAL, -1},
 	{"initial_excess_100_N", "N", "the same for 100 times the shortest", 0, -1e9, 1e9, -0.5, 0.5, TACTUS_INITIAL, -1},
 	{"initial_excess_1000_N", "N", "the same for 1000 times the shortest", 0, -1e9, 1e9, -0.5, 0.5, TACTUS_INITIAL, -1},
+	{"initial_freshness", "1", "1: the load came on just before the first sample; 0: the film had settled under it", 0,
+	 0, 1, 1, 0.2, TACTUS_INITIAL, -1},
 };
 
 static void reset(const double *p, double *state)
@@ -44,7 +46,7 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 			double *x = &state[FILTER + k], *kept = &state[KEPT + k * TACTUS_KEPT];
 			if (p[AMPLITUDE + k] == 0)
 				continue;
-			*x = first ? force[i] + p[INITIAL + k] : tactus_lowpass(kept, *x, force[i], dt, tau);
+			*x = first ? (1 - p[FRESH]) * force[i] + p[INITIAL + k] : tactus_lowpass(kept, *x, force[i], dt, tau);
 			sum += p[AMPLITUDE + k] * *x;
 		}
 		force[i] = sum;
@@ -61,6 +63,8 @@ static const char *testable(const tactus_series *series)
 	return tactus_want_reversal(series) ? "no load followed by recovery: it only rises or only falls" : NULL;
 }
 
+static const tactus_search searches[] = {{FRESH, TACTUS_SEARCH_VALUES, 2, {0, 1}}};
+
 const struct tactus_effect tactus_effect_sensor_creep = {
 	.name = "creep",
 	.summary = "the film gives way under a held load and recovers: the output grows with the logarithm of time",
@@ -75,5 +79,6 @@ const struct tactus_effect tactus_effect_sensor_creep = {
 	.state_size = STATES,
 	.reset = reset,
 	.process = process,
+	TACTUS_SEARCHES(searches),
 	.testable = testable,
 };
