@@ -89,8 +89,10 @@ static void json_cause(struct cli_json *json, const tactus_cause *cause)
 	json_interval(json, "held_out_gain_ci95", cause->held_out_gain_ci95);
 	cli_json_number(json, "p_value", cause->p_value);
 	cli_json_close(json);
+	/* What the data cannot tell from the cause; where nothing is, what else was considered. */
+	size_t rivals = cause->inseparable > 0 ? cause->inseparable : cause->rival_count;
 	cli_json_array(json, "rivals");
-	for (size_t i = 0; i < cause->rival_count; i++) {
+	for (size_t i = 0; i < rivals; i++) {
 		cli_json_object(json, NULL);
 		cli_json_string(json, "effect", cause->rivals[i].effect);
 		cli_json_number(json, "delta_bic", cause->rivals[i].delta_bic);

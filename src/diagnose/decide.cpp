@@ -290,7 +290,7 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 	const std::vector<Scored> scored = screen(fit, false);
 	for (const Scored &s : scored) {
 		if (tried == limits.tried || !(s.cost < -0.5 * limits.evidence) || s.part.free.empty() ||
-			s.cost > limits.hopeless * scored.front().cost)
+			(best.ok && s.cost > limits.hopeless * scored.front().cost))
 			break;
 		tried++;
 		const Fit joined = join(problem, fit, s.part);

@@ -231,6 +231,30 @@ const char *const computed[] = {"resistance_ohm",
 								"reference_capacitance_F",
 								"force_estimate_N"};
 
+/* True if a column is an output in another unit or form (counts that a conductance was computed from): same order. */
+bool restates_output(const tactus_table *table, const char *name, const tactus_series &series)
+{
+	const double *values = tactus_table_numbers(table, name);
+	for (size_t s = 0; values && s < series.domain->signal_count; s++) {
+		if (series.domain->signals[s].role != TACTUS_ROLE_OUTPUT || !series.signal[s])
+			continue;
+		std::vector<std::pair<double, double>> pairs;
+		for (size_t i = 0; i < series.n; i++)
+			if (std::isfinite(values[series.row[i]]) && std::isfinite(series.signal[s][i]))
+				pairs.emplace_back(values[series.row[i]], series.signal[s][i]);
+		std::sort(pairs.begin(), pairs.end());
+		size_t up = 0, down = 0;
+		for (size_t i = 1; i < pairs.size(); i++)
+			if (pairs[i].first > pairs[i - 1].first) {
+				up += pairs[i].second > pairs[i - 1].second;
+				down += pairs[i].second < pairs[i - 1].second;
+			}
+		if (up + down >= 20 && std::min(up, down) * 50 <= up + down)
+			return true;
+	}
+	return false;
+}
+
 std::vector<Extra> Diagnosis::extras(const Work &work, const std::vector<size_t> &index) const
 {
 	std::vector<Extra> result;
@@ -246,7 +270,7 @@ std::vector<Extra> Diagnosis::extras(const Work &work, const std::vector<size_t>
 			known = known || (output && name == output);
 		for (size_t s = 0; s < series.domain->signal_count; s++)
 			known = known || (name == series.domain->signals[s].name && series.recorded[s]);
-		if (known)
+		if (known || restates_output(first.table, name.c_str(), series))
 			continue;
 		Extra extra{name, {}};
 		for (const auto &[k, c] : members[index[0]]) {

@@ -74,7 +74,7 @@ void bootstrap(const Blocks &before, const Blocks &after, uint64_t seed, double 
 	const double wider =
 		(held.size() - 1 <= std::size(student) ? student[held.size() - 2] : 2.1) / 1.96 * std::sqrt(n / (n - 1));
 	*low = centre + wider * (values[25] - centre);
-	*high = centre + wider * (values[974] - centre);
+	*high = std::fmin(centre + wider * (values[974] - centre), 1); /* no error is less than none */
 }
 
 struct EstimatorFree {

@@ -12,7 +12,7 @@ struct Limits {
 	double evidence = 16;               /* fall of Schwarz's criterion that a cause must bring (e^8 : 1) */
 	double jump = 60, jump_share = 0.1; /* for instants, where held-out blocks cannot say */
 	double share = 0.05;                /* of the whitened squares that a cause must remove */
-	double further_share = 0.07;        /* and a further one, of all that was removed */
+	double further_share = 0.10;        /* and a further one, of all that was removed */
 	double relative_margin = 0.08;      /* and as a share of what the cause explains: no form is exact */
 	double margin = 10;                 /* over the runner-up, in Schwarz's criterion */
 	double parameter_share = 0.03;      /* of what an effect explains that each of its parameters must bring */

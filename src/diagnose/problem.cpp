@@ -133,7 +133,9 @@ void Problem::make_blocks()
 		longest = std::max(longest, size_t(run.count));
 	whole_recordings = count >= 3;
 	const int wanted = std::max(4, 32 / int(count));
-	const int per = int(std::clamp<size_t>(longest / 12, 1, size_t(wanted)));
+	/* A dozen rows each; a few static points still make some blocks. */
+	const int per =
+		int(std::clamp<size_t>(std::max(longest / 12, std::min<size_t>(longest / 4, 12)), 1, size_t(wanted)));
 	block_count = per * int(count);
 	test.assign(size_t(block_count), 0);
 	fold.assign(size_t(block_count), 0);
@@ -229,6 +231,8 @@ VectorXd Problem::whiten(const VectorXd &x) const
 			for (Index k = 0; k < p && k < i; k++)
 				value -= a[size_t(k)] * x[row - 1 - k];
 			w[row] = i < p ? 0 : value * inverse;
+			if (i == 0) /* the level that the others start from */
+				w[row] = x[row] / noise.spread[run.output];
 		}
 	}
 	return w;

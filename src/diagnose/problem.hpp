@@ -118,7 +118,7 @@ class Problem
 	bool simulate(const Hypothesis &h, VectorXd &y) const;
 	/* Values of a signal (or any per-sample value) at the rows; NaN where it is not recorded. */
 	VectorXd at_rows(size_t signal) const;
-	/* The noise's filter over every run; the first rows of a run, outliers and gaps become 0. */
+	/* The noise's filter over every run; of the rows that it has no past for, all but the first become 0. */
 	VectorXd whiten(const VectorXd &x) const;
 	void mask(Eigen::Ref<VectorXd> w, Rows which) const;
 	/* The values of the rows that train, close together. */

@@ -1,10 +1,12 @@
 """BLIND.md: figures with their intervals, confusion matrices, what was missed, and the recordings to look at."""
 
 import collections
+import pathlib
 import statistics
 
 import score
 
+REMARKS = pathlib.Path(__file__).with_name("remarks.md")  # written by hand after a run, on what it missed
 VERDICTS = ["nothing-wrong", "ambiguous", "unexplained", "stale-calibration", "bad-recording", "failed"]
 
 
@@ -96,9 +98,11 @@ as right is written at the head of `tests/blind/score.py`."""
 def markdown(scored, seeds, real=()):
     judged = score.figures(scored)
     missed = [score.TARGETS[f][0] for f, (yes, n) in judged.items() if score.verdict(f, yes, n)[0].startswith("missed")]
+    remarks = REMARKS.read_text(encoding="utf-8").splitlines()
     sections = [("# Blind tests of the diagnosis", [PREFACE.format(seeds=seeds), "",
                                                     f"Missed: {'; '.join(missed) if missed else 'none'}."]),
                 ("## Figures", [*figure_lines(scored), "", EXPLANATION]),
+                ("## Why targets are missed", remarks),
                 ("## One effect: truth against the first name or the verdict", [])]
     for domain in ("sensor", "readout"):
         for sign, clear in (("≥", True), ("<", False)):
