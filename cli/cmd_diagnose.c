@@ -1,6 +1,9 @@
 /* tactus diagnose: what a simulation gets wrong, the cause, the extended model, what it gains. */
 #include <stdlib.h>
 #include <string.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include "diagnose.h"
 
@@ -188,8 +191,19 @@ static int over_recordings(const struct cli *cli, const char *const *paths, size
 	return status;
 }
 
+/* Large matrices come and go all the time: their pages are kept, or the kernel would clear them each time. */
+static void keep_pages(void)
+{
+#ifdef __GLIBC__
+	mallopt(M_MMAP_THRESHOLD, 1 << 30);
+	mallopt(M_TRIM_THRESHOLD, 1 << 30);
+	mallopt(M_TOP_PAD, 1 << 24);
+#endif
+}
+
 static int run(struct cli *cli)
 {
+	keep_pages();
 	const char *paths[RECORDINGS_MAX] = {cli_recording(cli, 0)};
 	size_t count = 1, standard = 0;
 	if (!paths[0])

@@ -203,14 +203,16 @@ Dependence dependence(const Problem &problem, const Fit &fit, const Group &group
 		}
 	const double square = r.squaredNorm(), own = k - double(fit.jacobian.cols());
 	result.p_value = f_test(gain, square - gain, std::fmax(own, 1), double(problem.training) - k);
-	result.whitened = held_out_share(problem, columns, r);
-	VectorXd y;
-	problem.simulate(fit.hypothesis, y);
-	VectorXd raw = problem.measured - y;
-	problem.mask(raw, Rows::train);
-	result.explained = std::clamp(
-		held_out_share(problem, masked(problem, MatrixXd(r.size(), 0), group.columns, false), raw), 0.0, 1.0);
+	if (result.p_value < limits.structure_p)
+		result.whitened = held_out_share(problem, columns, r);
 	return result;
+}
+
+/* The same of the residual as it is, noise and all: what a reader sees. */
+static double explained_share(const Problem &problem, const VectorXd &raw, const Group &group)
+{
+	return std::clamp(held_out_share(problem, masked(problem, MatrixXd(raw.size(), 0), group.columns, false), raw), 0.0,
+					  1.0);
 }
 
 namespace
@@ -476,6 +478,12 @@ std::vector<Dependence> Decider::map(const Fit &fit) const
 	}
 	std::sort(found.begin(), found.end(),
 			  [](const Dependence &a, const Dependence &b) { return a.whitened > b.whitened; });
+	VectorXd y;
+	problem.simulate(fit.hypothesis, y);
+	VectorXd raw = problem.measured - y;
+	problem.mask(raw, Rows::train);
+	for (Dependence &dep : found)
+		dep.explained = explained_share(problem, raw, *dep.group);
 	return found;
 }
 

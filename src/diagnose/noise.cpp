@@ -33,7 +33,7 @@ MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residua
 			order.emplace_back(-std::abs(product) / size[j], j);
 	}
 	std::sort(order.begin(), order.end());
-	order.resize(std::min<size_t>({order.size(), size_t(n / 3), 160}));
+	order.resize(std::min<size_t>({order.size(), size_t(n / 3), 120}));
 	MatrixXd z(n, Index(order.size()) + 1);
 	Index at = 0;
 	for (const auto &[first, count] : pieces) {
