@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnose/basis.hpp"
+#include "diagnose/dependence.hpp"
 #include "diagnose/screen.hpp"
 
 namespace tactus::explain
@@ -26,13 +26,6 @@ struct Cause {
 	Fit without; /* the final model without it, refitted */
 	double delta, p_value;
 	std::vector<Rival> rivals;
-};
-
-struct Dependence {
-	const Group *group;
-	double explained; /* of the residual's variance, held out */
-	double whitened;  /* of the whitened squares, held out */
-	double p_value;
 };
 
 struct Moved {
@@ -70,8 +63,6 @@ struct Evidence {
 
 Decision decide(const Evidence &evidence);
 
-/* How a group of smooth functions explains what a fit leaves. */
-Dependence dependence(const Problem &problem, const Fit &fit, const Group &group);
 /* Standard errors that a block's paired gain lies above 0: Σ (a − b) over training blocks. */
 double paired(const Problem &problem, const std::vector<double> &a, const std::vector<double> &b);
 /* Fall of the criterion from one fit to a larger one, for comparisons between causes. */

@@ -107,7 +107,7 @@ int Diagnosis::split()
 							whole = whole && s.signal[k] && std::isfinite(s.signal[k][i]);
 					use[i] = whole;
 				}
-				if (s.domain == &tactus_domain_sensor)
+				if (s.domain->loaded)
 					for (const size_t i : find_wild(&s, s.signal[signal], use))
 						wild[s.channel].push_back(s.row[i]);
 				outputs.push_back(std::move(use));

@@ -140,7 +140,7 @@ std::string scan_command(const Work &work, const char *device, const std::string
 	std::string command = "tactus scan ";
 	const std::string uri = device;
 	command += uri.find_first_of(" \t\"'") == std::string::npos ? uri : "'" + uri + "'";
-	if (work.channel > 0 && work.problem->domain == &tactus_domain_sensor)
+	if (work.channel > 0 && work.problem->domain->loaded)
 		command += " --channels " + std::to_string(work.channel);
 	return command + " " + rest + " -o next.csv";
 }
@@ -217,7 +217,7 @@ std::string by_covariate(const Work &work, const char *device, const tactus_effe
 	const std::string covariate = effect ? effect->covariate : "";
 	const double high = tactus_series_maximum(work.problem->segments.front(), int(work.problem->input_signal()));
 	const std::string loads = steps_of({"repeat 2 (ramp 0N..{H} 20s, ramp {H}..0N 20s)", 10, ""}, 0, high);
-	if (work.problem->domain != &tactus_domain_sensor)
+	if (!work.problem->domain->loaded)
 		return scan_command(work, device, "--loads standard --mode dc,ac");
 	std::string command = command_of(work, device, loads, 10);
 	if (covariate == "drive_V") {
@@ -232,7 +232,7 @@ std::string by_covariate(const Work &work, const char *device, const tactus_effe
 const tactus_experiment *to_test_more(Store &store, const Work &work, const char *device)
 {
 	const Decision &d = work.decision;
-	if (work.problem->domain != &tactus_domain_sensor || !(work.problem->input_range > 0))
+	if (!work.problem->domain->loaded || !(work.problem->input_range > 0))
 		return nullptr;
 	std::vector<std::string> names;
 	auto newly = [&](const Synthetic &s) {
@@ -274,7 +274,7 @@ const tactus_experiment *propose(Store &store, const Work &work, const char *dev
 			first = first || !r.effect ? first : &r;
 		}
 	const tactus_effect *effect = stale ? nullptr : d.causes.front().effect;
-	if (first && work.problem->domain == &tactus_domain_sensor) {
+	if (first && work.problem->domain->loaded) {
 		const Choice choice =
 			Menu(work).best([&](Synthetic &s) { return evidence_of(work, s, ours, first->hypothesis); });
 		if (choice.item && choice.evidence > limits.margin) {
@@ -291,7 +291,7 @@ const tactus_experiment *propose(Store &store, const Work &work, const char *dev
 							  : d.moved.separated_by              ? d.moved.separated_by
 																  : "another experiment";
 	std::string command = by_covariate(work, device, effect);
-	if (work.problem->domain == &tactus_domain_sensor)
+	if (work.problem->domain->loaded)
 		command = scan_command(work, device, "--loads standard --mode dc,ac");
 	return made(store, names, command, "what tells them apart: " + apart, NAN);
 }

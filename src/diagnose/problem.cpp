@@ -259,17 +259,7 @@ VectorXd Problem::training_rows(const Eigen::Ref<const VectorXd> &w) const
 
 double Problem::ranged(const tactus_parameter &info, double value) const
 {
-	const std::string unit = info.unit;
-	auto of = [&](const std::string &word) {
-		if (word == "N" && input_range > 0)
-			return input_range;
-		for (size_t o = 0; o < output_count; o++)
-			if (word == "output" + std::to_string(o) && range[o] > 0)
-				return range[o];
-		return 1.0;
-	};
-	const size_t slash = unit.find('/');
-	return value * of(unit.substr(0, slash)) / (slash == std::string::npos ? 1 : of(unit.substr(slash + 1)));
+	return value * tactus_unit_range(info.unit, input_range, range, output_count);
 }
 
 bool Problem::acts(const tactus_parameter &info) const

@@ -103,25 +103,10 @@ void ForwardProblem::set_scales(const double *scales)
 			measured[at++] = series->signal[output_signal[o]][row.sample * step] * row.root_weight / output_scale[o];
 }
 
-/* Ranges in a unit such as "output0/N": start and scale of a parameter are stated for a range of 1 (engine.h). */
-double ForwardProblem::unit_range(const std::string &unit) const
-{
-	auto range = [&](const std::string &word) {
-		if (word == "N" && input_range > 0)
-			return input_range;
-		for (size_t o = 0; o < output_count; o++)
-			if (word == "output" + std::to_string(o) && output_range[o] > 0)
-				return output_range[o];
-		return 1.0;
-	};
-	const size_t slash = unit.find('/');
-	return range(unit.substr(0, slash)) / (slash == std::string::npos ? 1 : range(unit.substr(slash + 1)));
-}
-
 /* What is fitted, where it starts; a constant is stated for the range of these data unless the model states it. */
 void ForwardProblem::add_slot(long effect, size_t index, const tactus_parameter &info, double &value, bool refit)
 {
-	const double unit = unit_range(info.unit);
+	const double unit = tactus_unit_range(info.unit, input_range, output_range, output_count);
 	double start = refit && std::isfinite(value) ? value : info.start * unit;
 	start = std::fmin(std::fmax(start, info.lower), info.upper);
 	if (info.kind == TACTUS_CONSTANT)

@@ -62,7 +62,6 @@ class ForwardProblem
 	std::vector<Slot> slots;
 
   private:
-	double unit_range(const std::string &unit) const;
 	void add_slot(long effect, size_t index, const tactus_parameter &info, double &value, bool refit);
 	void thin(size_t stride);
 

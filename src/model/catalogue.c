@@ -151,3 +151,21 @@ tactus_parameter_info tactus_effect_parameter(const tactus_effect *effect, size_
 	const tactus_parameter *p = &effect->parameters[i];
 	return (tactus_parameter_info){p->name, public_unit(p->unit), p->summary, p->neutral, p->lower, p->upper};
 }
+
+static double range_of(const char *word, size_t length, double input_range, const double *output_range, size_t outputs)
+{
+	double range = 1;
+	if (length == 1 && *word == 'N')
+		range = input_range;
+	else if (length == 7 && strncmp(word, "output", 6) == 0 && (size_t)(word[6] - '0') < outputs)
+		range = output_range[word[6] - '0'];
+	return range > 0 ? range : 1;
+}
+
+double tactus_unit_range(const char *unit, double input_range, const double *output_range, size_t outputs)
+{
+	size_t length = strcspn(unit, "/");
+	const char *below = unit + length + (unit[length] == '/');
+	return range_of(unit, length, input_range, output_range, outputs) /
+		   range_of(below, strlen(below), input_range, output_range, outputs);
+}

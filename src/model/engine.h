@@ -139,6 +139,12 @@ struct tactus_effect {
 /* True if every strength is at its neutral value: the chain then skips the effect. */
 bool tactus_effect_neutral(const tactus_effect *effect, const double *parameters);
 
+/*
+ * `start` and `scale` of a parameter are stated for an input and outputs that range over 1: what to multiply them with
+ * in given data. unit: such as "output0/N"; a range that is not above 0 counts as 1.
+ */
+double tactus_unit_range(const char *unit, double input_range, const double *output_range, size_t outputs);
+
 /* ---- domains ---- */
 
 typedef struct {
@@ -157,6 +163,7 @@ typedef struct {
 
 struct tactus_domain {
 	const char *name, *summary;
+	bool loaded; /* the input is a load in newtons: a press can follow a protocol, the live inverse is a force */
 	const tactus_signal *signals;
 	size_t signal_count;
 	const tactus_stage *stages;
