@@ -44,28 +44,38 @@ double paired(const Problem &problem, const std::vector<double> &a, const std::v
 namespace
 {
 
-/* Strengths that went back to where they change nothing are taken out; false if one ran against its other bound. */
+/*
+ * Strengths that went back to where they change nothing are taken out, and one that ran against its other bound, if
+ * others of the effect are left: two forms of one cause can drive each other there. False if none is left.
+ */
 bool drop_idle(Hypothesis &h, const tactus_effect *effect, bool &changed)
 {
+	auto term = [&](size_t p) { return effect->term ? effect->term(p) : 0; };
 	for (Part &part : h.parts) {
 		if (part.effect != effect)
 			continue;
 		std::vector<size_t> kept;
-		bool strength = false;
+		std::vector<int> terms; /* that a strength is left of */
 		for (const size_t p : part.free) {
 			const tactus_parameter &info = effect->parameters[p];
 			const bool at_bound = part.value[p] <= info.lower || part.value[p] >= info.upper;
-			if (at_bound && info.kind == TACTUS_STRENGTH && part.value[p] != info.neutral)
-				return false;
+			if (at_bound && info.kind == TACTUS_STRENGTH)
+				part.value[p] = info.neutral;
 			if (at_bound) { /* neutral, or as good as stated */
 				changed = true;
 				continue;
 			}
-			strength = strength || info.kind == TACTUS_STRENGTH;
 			kept.push_back(p);
+			if (info.kind == TACTUS_STRENGTH)
+				terms.push_back(term(p));
 		}
-		part.free = kept;
-		return strength;
+		part.free.clear();
+		for (const size_t p : kept)
+			if (std::find(terms.begin(), terms.end(), term(p)) != terms.end() ||
+				effect->parameters[p].kind == TACTUS_INITIAL)
+				part.free.push_back(p);
+		changed = changed || part.free.size() < kept.size();
+		return !terms.empty();
 	}
 	return false;
 }

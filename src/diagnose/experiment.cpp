@@ -232,7 +232,7 @@ std::string by_covariate(const Work &work, const char *device, const tactus_effe
 const tactus_experiment *to_test_more(Store &store, const Work &work, const char *device)
 {
 	const Decision &d = work.decision;
-	if (!work.problem->domain->loaded || !(work.problem->input_range > 0))
+	if (!work.newtons())
 		return nullptr;
 	std::vector<std::string> names;
 	auto newly = [&](const Synthetic &s) {
@@ -274,7 +274,7 @@ const tactus_experiment *propose(Store &store, const Work &work, const char *dev
 			first = first || !r.effect ? first : &r;
 		}
 	const tactus_effect *effect = stale ? nullptr : d.causes.front().effect;
-	if (first && work.problem->domain->loaded) {
+	if (first && work.newtons()) {
 		const Choice choice =
 			Menu(work).best([&](Synthetic &s) { return evidence_of(work, s, ours, first->hypothesis); });
 		if (choice.item && choice.evidence > limits.margin) {

@@ -94,7 +94,7 @@ struct ModelFree {
 double force_rmse(const Work &work, const Hypothesis &h)
 {
 	const Problem &problem = *work.problem;
-	if (!problem.domain->loaded || !(problem.input_range > 0))
+	if (!work.newtons())
 		return NAN;
 	const std::unique_ptr<tactus_model, ModelFree> model(model_of(work, h, problem.noise));
 	if (!model || tactus_model_whole(model.get()))

@@ -39,6 +39,13 @@ struct Store {
 
 /* One series on its way through. */
 struct Work {
+	/* A press can follow a protocol, and the live inverse gives newtons: not where another column plays the load. */
+	bool newtons() const
+	{
+		const size_t n = input_name.size();
+		return problem->domain->loaded && problem->input_range > 0 && n > 2 && input_name.compare(n - 2, 2, "_N") == 0;
+	}
+
 	int channel = 0;
 	std::vector<tactus_series> thinned; /* own copies where the recording is longer than is looked at */
 	std::vector<std::vector<double>> buffers;

@@ -479,7 +479,7 @@ int tactus_fit(const tactus_table *recording, const tactus_fit_options *options,
 		status = tactus_columns_of_model(recording, o->start, &columns);
 	if (status == TACTUS_OK)
 		status = tactus_series_split(recording, &columns, &series, &count);
-	if (status < 0)
+	if (status != TACTUS_OK)
 		return status;
 	status = make_plan(o, &series[0], k, &plan);
 	if (status == TACTUS_OK) {
