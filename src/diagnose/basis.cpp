@@ -252,7 +252,7 @@ std::vector<Group> groups_of(const Problem &problem, const std::vector<Extra> &e
 		collect.add(extra.name, "level", hats(v, 7), v, true);
 		collect.add(extra.name, "sensitivity", times(hats(v, 5), gain), v, true);
 	}
-	return collect.result;
+	return std::move(collect.result);
 }
 
 } // namespace tactus::explain

@@ -23,11 +23,14 @@ MatrixXd masked(const Problem &problem, const MatrixXd &jacobian, const MatrixXd
 {
 	MatrixXd all(problem.rows(), jacobian.cols() + columns.cols());
 	for (Index j = 0; j < all.cols(); j++) {
-		VectorXd c = j < jacobian.cols() ? VectorXd(jacobian.col(j)) : VectorXd(columns.col(j - jacobian.cols()));
-		if (whiten && j >= jacobian.cols())
-			c = problem.whiten(c);
-		problem.mask(c, Rows::train);
-		all.col(j) = c / std::fmax(c.norm(), 1e-300);
+		if (j < jacobian.cols())
+			all.col(j) = jacobian.col(j);
+		else if (whiten)
+			all.col(j) = problem.whiten(columns.col(j - jacobian.cols()));
+		else
+			all.col(j) = columns.col(j - jacobian.cols());
+		problem.mask(all.col(j), Rows::train);
+		all.col(j) /= std::fmax(all.col(j).norm(), 1e-300);
 	}
 	return all;
 }

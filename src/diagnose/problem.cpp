@@ -163,9 +163,12 @@ void Problem::make_blocks()
 void Problem::count_training()
 {
 	training_of.assign(output_count, 0);
+	trained.assign(size_t(rows()), 0);
 	for (const Run &run : runs)
-		for (Index i = run.first; i < run.first + run.count; i++)
-			training_of[run.output] += trains(i, Rows::train);
+		for (Index i = run.first; i < run.first + run.count; i++) {
+			trained[size_t(i)] = trains(i, Rows::train);
+			training_of[run.output] += trained[size_t(i)];
+		}
 	training = std::accumulate(training_of.begin(), training_of.end(), Index(0));
 }
 
@@ -218,14 +221,16 @@ bool Problem::simulate(const Hypothesis &h, VectorXd &y) const
 	return y.allFinite();
 }
 
-VectorXd Problem::whiten(const VectorXd &x) const
+VectorXd Problem::whiten(const Eigen::Ref<const VectorXd> &x) const
 {
 	VectorXd w(x.size());
 	for (const Run &run : runs) {
 		const std::vector<double> &a = noise.a[run.output];
 		const double inverse = 1 / noise.sigma[run.output];
 		const auto p = Index(a.size());
-		for (Index i = 0; i < run.count; i++) {
+		if (p == 0)
+			w.segment(run.first, run.count) = x.segment(run.first, run.count) * inverse;
+		for (Index i = 0; p > 0 && i < run.count; i++) {
 			const Index row = run.first + i;
 			double value = x[row];
 			for (Index k = 0; k < p && k < i; k++)
@@ -241,7 +246,7 @@ VectorXd Problem::whiten(const VectorXd &x) const
 void Problem::mask(Eigen::Ref<VectorXd> w, Rows which) const
 {
 	for (Index i = 0; i < w.size(); i++)
-		if (!trains(i, which))
+		if (which == Rows::train ? !trained[size_t(i)] : !trains(i, which))
 			w[i] = 0;
 }
 
@@ -250,7 +255,7 @@ VectorXd Problem::training_rows(const Eigen::Ref<const VectorXd> &w) const
 	VectorXd kept(training);
 	Index at = 0;
 	for (Index i = 0; i < w.size(); i++)
-		if (trains(i, Rows::train))
+		if (trained[size_t(i)])
 			kept[at++] = w[i];
 	return kept;
 }

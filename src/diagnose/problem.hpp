@@ -103,6 +103,7 @@ class Problem
 	std::vector<char> excluded;     /* per row: an outlier */
 	Index training = 0;             /* rows that train */
 	std::vector<Index> training_of; /* of them, those of each output, which follow one another */
+	std::vector<char> trained;      /* per row: it trains */
 
 	Index rows() const
 	{
@@ -119,7 +120,7 @@ class Problem
 	/* Values of a signal (or any per-sample value) at the rows; NaN where it is not recorded. */
 	VectorXd at_rows(size_t signal) const;
 	/* The noise's filter over every run; of the rows that it has no past for, all but the first become 0. */
-	VectorXd whiten(const VectorXd &x) const;
+	VectorXd whiten(const Eigen::Ref<const VectorXd> &x) const;
 	void mask(Eigen::Ref<VectorXd> w, Rows which) const;
 	/* The values of the rows that train, close together. */
 	VectorXd training_rows(const Eigen::Ref<const VectorXd> &w) const;
