@@ -50,7 +50,6 @@ namespace
  */
 bool drop_idle(Hypothesis &h, const tactus_effect *effect, bool &changed)
 {
-	auto term = [&](size_t p) { return effect->term ? effect->term(p) : 0; };
 	for (Part &part : h.parts) {
 		if (part.effect != effect)
 			continue;
@@ -67,11 +66,11 @@ bool drop_idle(Hypothesis &h, const tactus_effect *effect, bool &changed)
 			}
 			kept.push_back(p);
 			if (info.kind == TACTUS_STRENGTH)
-				terms.push_back(term(p));
+				terms.push_back(term_of(effect, p));
 		}
 		part.free.clear();
 		for (const size_t p : kept)
-			if (std::find(terms.begin(), terms.end(), term(p)) != terms.end() ||
+			if (std::find(terms.begin(), terms.end(), term_of(effect, p)) != terms.end() ||
 				effect->parameters[p].kind == TACTUS_INITIAL)
 				part.free.push_back(p);
 		changed = changed || part.free.size() < kept.size();

@@ -7,15 +7,15 @@
 namespace tactus::explain
 {
 
-namespace
-{
-
-const double seldom = 1e-7; /* share of a column that must be its own */
-
 int term_of(const tactus_effect *effect, size_t parameter)
 {
 	return effect->term ? effect->term(parameter) : 0;
 }
+
+namespace
+{
+
+const double seldom = 1e-7; /* share of a column that must be its own */
 
 void add_within(std::vector<double> &values, const tactus_parameter &info, double value)
 {

@@ -12,6 +12,9 @@
 namespace tactus::explain
 {
 
+/* The term of an effect that a parameter belongs to (engine.h). */
+int term_of(const tactus_effect *effect, size_t parameter);
+
 /* A term of an effect at one choice of what is searched over a grid: a column per strength, from `first` on. */
 struct Point {
 	Part part;                     /* strengths neutral, the searched parameters set */
