@@ -31,7 +31,7 @@ ifneq ($(WERROR),)
 WARN += -Werror
 endif
 SANITIZE ?=
-PACKAGES := jansson tomlplusplus
+PACKAGES := jansson tomlplusplus hidapi-hidraw libusb-1.0 libmodbus libserialport
 PKG_CFLAGS := $(shell pkg-config --cflags $(PACKAGES) eigen3 2>/dev/null)
 PKG_LIBS := $(strip $(shell pkg-config --libs $(PACKAGES) 2>/dev/null))
 
@@ -137,8 +137,12 @@ $(PROGRAM): $(CLI_OBJ) $(SHARED) $(BUILD)/objects
 # Unit tests link the static library: they may look inside.
 $(BUILD)/tests/%: tests/unit/%.c $(STATIC)
 	@mkdir -p $(@D)
-	$(call say,TEST)$(CC) $(CPPFLAGS_ALL) $(LIB_CFLAGS) -Itests/unit $(CFLAGS_ALL) $(DEPFLAGS) $< -o $@ $(STATIC) \
-		$(LDFLAGS) -lcmocka $(LDLIBS_PRIVATE)
+	$(call say,TEST)$(CC) $(CPPFLAGS_ALL) $(LIB_CFLAGS) -Itests/unit $(TEST_CFLAGS) $(CFLAGS_ALL) $(DEPFLAGS) $< -o $@ \
+		$(STATIC) $(LDFLAGS) -lcmocka $(TEST_LIBS) $(LDLIBS_PRIVATE)
+
+# Suites that bring their own devices: scripts/run-tests puts umockdev between them and the kernel.
+$(BUILD)/tests/test_mock_% $(BUILD)/tidy/tests/unit/test_mock_%: TEST_CFLAGS = $(shell pkg-config --cflags umockdev-1.0 | sed 's/-I/-isystem /g')
+$(BUILD)/tests/test_mock_%: TEST_LIBS = $(shell pkg-config --libs umockdev-1.0)
 
 # `pkg-config --libs tactus` links the shared library alone, `--static` adds what it is made of.
 define PC
@@ -234,7 +238,7 @@ check-tidy: $(TIDY)
 TIDY_DEPENDS := .clang-tidy $(HEADERS) $(wildcard src/*/*.h cli/*.h)
 $(BUILD)/tidy/%.c: %.c $(TIDY_DEPENDS)
 	@mkdir -p $(@D)
-	$(call say,TIDY)clang-tidy --quiet $< -- -std=c17 $(CPPFLAGS_ALL) $(LIB_CFLAGS) -Icli -Wall -Wextra 2>$@.log || { cat $@.log; exit 1; }
+	$(call say,TIDY)clang-tidy --quiet $< -- -std=c17 $(CPPFLAGS_ALL) $(LIB_CFLAGS) $(TEST_CFLAGS) -Icli -Wall -Wextra 2>$@.log || { cat $@.log; exit 1; }
 	@touch $@
 
 # Without the path-sensitive analyser: on the templates of Eigen and Ceres it takes minutes and finds nothing of ours.
