@@ -1,18 +1,15 @@
-/* Recordings in, a diagnosis out: split, gated, explained series by series, put together. */
+/* Recordings in, a diagnosis out: gathered, explained series by series, put together. */
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <ctime>
-#include <map>
 
 #include <tactus/version.h>
 
 #include "core/core.h"
-#include "diagnose/gates.h"
+#include "diagnose/gather.hpp"
 #include "diagnose/noise.hpp"
-#include "diagnose/report.hpp"
 #include "fit/fit_work.h"
-#include "model/columns.h"
 
 namespace tactus::explain
 {
@@ -20,38 +17,12 @@ namespace tactus::explain
 namespace
 {
 
-const size_t most_samples = 40000; /* of a series that are looked at; a longer one is thinned */
-
-/* A recording and what it was split into. */
-struct Recording {
-	const tactus_table *table;
-	tactus_series *series = nullptr;
-	size_t count = 0;
-	std::vector<std::vector<std::vector<char>>> use; /* series, output, sample */
-
-	explicit Recording(const tactus_table *t) : table(t)
-	{
-	}
-	Recording(const Recording &) = delete;
-	Recording(Recording &&other) noexcept
-		: table(other.table), series(other.series), count(other.count), use(std::move(other.use))
-	{
-		other.series = nullptr;
-	}
-	~Recording()
-	{
-		tactus_series_free(series, count);
-	}
-};
-
 class Diagnosis
 {
   public:
 	Diagnosis(const tactus_table *const *tables, size_t count, const tactus_diagnose_options &o)
-		: options(o), store(new Store)
+		: options(o), gathered(tables, count, o), store(new Store)
 	{
-		for (size_t i = 0; i < count; i++)
-			recordings.emplace_back(tables[i]);
 	}
 	int run();
 	Store *release()
@@ -60,273 +31,18 @@ class Diagnosis
 	}
 
   private:
-	int split();
-	int gate();
-	void gather();
-	void prepare(Work &work);
 	void noise(Work &work, const VectorXd &y, const Hypothesis &h, bool candidates);
 	void explain(Work &work);
 	void hold_stated(Work &work, Hypothesis &base) const;
-	std::vector<Extra> extras(const Work &work, const std::vector<size_t> &index) const;
 	int extended();
 	void summarise();
 
 	const tactus_diagnose_options &options;
-	std::vector<Recording> recordings;
-	std::vector<Work> works;
-	std::vector<std::vector<std::pair<size_t, size_t>>> members; /* per work: recording, series */
-	std::map<int, std::vector<size_t>> wild; /* per channel: rows of readings that are left out from the start */
-	std::map<int, const char *> hopeless;    /* per channel; 0: all */
+	Gathered gathered;
+	const std::vector<Recording> &recordings = gathered.recordings;
+	std::vector<Work> &works = gathered.works;
 	std::unique_ptr<Store> store;
 };
-
-int Diagnosis::split()
-{
-	for (Recording &r : recordings) {
-		tactus_series_options how = {options.domain, options.input, options.output, false};
-		int status = options.model ? tactus_columns_of_model(r.table, options.model, &how) : TACTUS_OK;
-		if (status == TACTUS_OK)
-			status = tactus_series_split(r.table, &how, &r.series, &r.count);
-		if (status != TACTUS_OK)
-			return status;
-		if (r.series->domain != recordings.front().series->domain)
-			return tactus_fail(TACTUS_ERR_INPUT, "%s is of domain %s, %s of %s: diagnose them apart",
-							   tactus_table_file(r.table), r.series->domain->name,
-							   tactus_table_file(recordings.front().table), recordings.front().series->domain->name);
-		for (size_t c = 0; c < r.count; c++) {
-			std::vector<std::vector<char>> outputs;
-			const tactus_series &s = r.series[c];
-			for (size_t signal = 0; signal < s.domain->signal_count; signal++) {
-				if (s.domain->signals[signal].role != TACTUS_ROLE_OUTPUT)
-					continue;
-				std::vector<char> use(s.n, 0);
-				for (size_t i = 0; s.signal[signal] && i < s.n; i++) {
-					bool whole = std::isfinite(s.signal[signal][i]);
-					for (size_t k = 0; k < s.domain->signal_count; k++)
-						if (s.domain->signals[k].role == TACTUS_ROLE_INPUT && std::isnan(s.domain->signals[k].fill))
-							whole = whole && s.signal[k] && std::isfinite(s.signal[k][i]);
-					use[i] = whole;
-				}
-				if (s.domain->loaded)
-					for (const size_t i : find_wild(&s, s.signal[signal], use))
-						wild[s.channel].push_back(s.row[i]);
-				outputs.push_back(std::move(use));
-			}
-			r.use.push_back(std::move(outputs));
-		}
-	}
-	if (options.model && options.model->domain != recordings.front().series->domain)
-		return tactus_fail(TACTUS_ERR_UNSUPPORTED, "the model is of domain %s, the recording of %s",
-						   options.model->domain->name, recordings.front().series->domain->name);
-	return TACTUS_OK;
-}
-
-int Diagnosis::gate()
-{
-	for (size_t k = 0; k < recordings.size(); k++) {
-		Recording &r = recordings[k];
-		std::vector<std::vector<bool *>> rows;
-		std::vector<bool *const *> channels;
-		std::deque<std::unique_ptr<bool[]>> flags;
-		for (size_t c = 0; c < r.count; c++) {
-			rows.emplace_back();
-			for (const std::vector<char> &use : r.use[c]) {
-				flags.emplace_back(new bool[use.size() + 1]);
-				std::copy(use.begin(), use.end(), flags.back().get());
-				rows.back().push_back(flags.back().get());
-			}
-			rows.back().push_back(nullptr);
-		}
-		channels.reserve(rows.size());
-		for (const std::vector<bool *> &row : rows)
-			channels.push_back(row.data());
-		tactus_gate_problems found = {nullptr, 0, 0};
-		const int status = tactus_gates(r.table, r.series, r.count, channels.data(), &found);
-		for (size_t i = 0; i < found.count; i++) {
-			const tactus_gate_problem &p = found.items[i];
-			store->problems.push_back({p.kind, store->text(p.text), k, p.channel, p.fatal,
-									   store->keep(std::vector<size_t>(p.rows, p.rows + p.row_count)), p.row_count});
-			if (p.fatal)
-				hopeless[p.channel] = store->problems.back().text;
-		}
-		tactus_gates_free(&found);
-		if (status != TACTUS_OK)
-			return status;
-		for (size_t c = 0; c < r.count; c++)
-			for (size_t o = 0; o < r.use[c].size(); o++)
-				std::copy_n(rows[c][o], r.use[c][o].size(), r.use[c][o].begin());
-	}
-	return TACTUS_OK;
-}
-
-/* Series of one channel in all recordings belong together. */
-void Diagnosis::gather()
-{
-	for (size_t k = 0; k < recordings.size(); k++)
-		for (size_t c = 0; c < recordings[k].count; c++) {
-			const int channel = recordings[k].series[c].channel;
-			size_t at = 0;
-			while (at < works.size() && works[at].channel != channel)
-				at++;
-			if (at == works.size()) {
-				works.emplace_back();
-				works.back().channel = channel;
-				members.emplace_back();
-			}
-			members[at].emplace_back(k, c);
-		}
-	std::vector<size_t> order(works.size());
-	for (size_t i = 0; i < order.size(); i++)
-		order[i] = i;
-	std::stable_sort(order.begin(), order.end(),
-					 [&](size_t a, size_t b) { return works[a].channel < works[b].channel; });
-	std::vector<Work> sorted;
-	std::vector<std::vector<std::pair<size_t, size_t>>> sorted_members;
-	for (const size_t i : order) {
-		sorted.push_back(std::move(works[i]));
-		sorted_members.push_back(std::move(members[i]));
-	}
-	works = std::move(sorted);
-	members = std::move(sorted_members);
-}
-
-/* Every stride-th sample of a series, with copies of its own. */
-tactus_series thin(const tactus_series &s, size_t stride, std::vector<std::vector<double>> &buffers)
-{
-	tactus_series result = s;
-	result.n = (s.n + stride - 1) / stride;
-	for (size_t k = 0; k < s.domain->signal_count; k++) {
-		if (!s.signal[k])
-			continue;
-		std::vector<double> kept;
-		for (size_t i = 0; i < s.n; i += stride)
-			kept.push_back(s.signal[k][i]);
-		buffers.push_back(std::move(kept));
-		result.signal[k] = buffers.back().data();
-	}
-	result.dt = s.dt * double(stride);
-	return result;
-}
-
-/* Not a multiple of what comes in turn (dc and ac rows, eight channels). */
-size_t odd(size_t stride)
-{
-	while (stride > 1 && (stride % 2 == 0 || stride % 3 == 0 || stride % 5 == 0))
-		stride++;
-	return stride;
-}
-
-const char *const computed[] = {"resistance_ohm",
-								"conductance_S",
-								"capacitance_F",
-								"amplitude_V",
-								"phase_rad",
-								"detector_amplitude_V",
-								"detector_phase_V",
-								"detector_dc_V",
-								"sequence",
-								"channel",
-								"time_s",
-								"reference_resistance_ohm",
-								"reference_capacitance_F",
-								"force_estimate_N"};
-
-/* True if a column is an output in another unit or form (counts that a conductance was computed from): same order. */
-bool restates_output(const tactus_table *table, const char *name, const tactus_series &series)
-{
-	const double *values = tactus_table_numbers(table, name);
-	for (size_t s = 0; values && s < series.domain->signal_count; s++) {
-		if (series.domain->signals[s].role != TACTUS_ROLE_OUTPUT || !series.signal[s])
-			continue;
-		std::vector<std::pair<double, double>> pairs;
-		for (size_t i = 0; i < series.n; i++)
-			if (std::isfinite(values[series.row[i]]) && std::isfinite(series.signal[s][i]))
-				pairs.emplace_back(values[series.row[i]], series.signal[s][i]);
-		std::sort(pairs.begin(), pairs.end());
-		size_t up = 0, down = 0;
-		for (size_t i = 1; i < pairs.size(); i++)
-			if (pairs[i].first > pairs[i - 1].first) {
-				up += pairs[i].second > pairs[i - 1].second;
-				down += pairs[i].second < pairs[i - 1].second;
-			}
-		if (up + down >= 20 && std::min(up, down) * 50 <= up + down)
-			return true;
-	}
-	return false;
-}
-
-std::vector<Extra> Diagnosis::extras(const Work &work, const std::vector<size_t> &index) const
-{
-	std::vector<Extra> result;
-	const Recording &first = recordings[members[index[0]][0].first];
-	const tactus_series &series = first.series[members[index[0]][0].second];
-	for (size_t column = 0; column < tactus_table_columns(first.table) && result.size() < 40; column++) {
-		const std::string name = tactus_table_name(first.table, column);
-		if (tactus_table_type(first.table, column) != TACTUS_COLUMN_NUMBER || name.find("_std") != std::string::npos ||
-			name == series.input_name)
-			continue;
-		bool known = std::any_of(std::begin(computed), std::end(computed), [&](const char *c) { return name == c; });
-		for (const char *output : series.output_name)
-			known = known || (output && name == output);
-		for (size_t s = 0; s < series.domain->signal_count; s++)
-			known = known || (name == series.domain->signals[s].name && series.recorded[s]);
-		if (known || restates_output(first.table, name.c_str(), series))
-			continue;
-		Extra extra{name, {}};
-		for (const auto &[k, c] : members[index[0]]) {
-			const double *values = tactus_table_numbers(recordings[k].table, name.c_str());
-			const tactus_series &s = recordings[k].series[c];
-			std::vector<double> at;
-			for (size_t i = 0; i < s.n; i += work.every)
-				at.push_back(values ? values[s.row[i]] : NAN);
-			extra.values.push_back(std::move(at));
-		}
-		result.push_back(std::move(extra));
-	}
-	return result;
-}
-
-void Diagnosis::prepare(Work &work)
-{
-	const auto at = size_t(&work - works.data());
-	size_t longest = 0;
-	for (const auto &[k, c] : members[at])
-		longest += recordings[k].series[c].n;
-	work.every = odd((longest + most_samples - 1) / most_samples);
-	std::vector<const tactus_series *> segments;
-	std::vector<std::vector<std::vector<char>>> use;
-	work.thinned.reserve(members[at].size());
-	for (const auto &[k, c] : members[at]) {
-		const Recording &r = recordings[k];
-		if (work.every == 1) {
-			segments.push_back(&r.series[c]);
-			use.push_back(r.use[c]);
-			continue;
-		}
-		work.buffers.reserve(work.buffers.size() + TACTUS_SIGNALS_MAX);
-		work.thinned.push_back(thin(r.series[c], work.every, work.buffers));
-		segments.push_back(&work.thinned.back());
-		use.emplace_back();
-		for (const std::vector<char> &all : r.use[c]) {
-			std::vector<char> kept;
-			for (size_t i = 0; i < all.size(); i += work.every)
-				kept.push_back(all[i]);
-			use.back().push_back(std::move(kept));
-		}
-	}
-	const tactus_series *first = segments.front();
-	work.input_name = first->input_name ? first->input_name : "";
-	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
-		work.output_name[o] = first->output_name[o] ? first->output_name[o] : "";
-		const size_t suffix = work.output_name[o].rfind('_');
-		work.output_unit[o] = suffix == std::string::npos ? "" : work.output_name[o].substr(suffix + 1);
-	}
-	work.problem = std::make_unique<Problem>(segments, use);
-	const auto fatal = hopeless.find(work.channel);
-	work.hopeless = fatal != hopeless.end() ? fatal->second : hopeless.count(0) ? hopeless[0] : nullptr;
-	if (!work.hopeless && work.problem->rows() < 20)
-		work.hopeless = "fewer than 20 readings change with anything";
-}
 
 void Diagnosis::noise(Work &work, const VectorXd &y, const Hypothesis &h, bool candidates)
 {
@@ -428,7 +144,7 @@ void Diagnosis::explain(Work &work)
 		return;
 	VectorXd y;
 	problem.simulate(plain.hypothesis, y);
-	work.evidence.groups = groups_of(problem, extras(work, {size_t(&work - works.data())}), y, work.input_name);
+	work.evidence.groups = groups_of(problem, gathered.extras(work), y, work.input_name);
 	noise(work, y, plain.hypothesis, true);
 	work.evidence.base = plain.hypothesis;
 	work.decision = decide(work.evidence);
@@ -588,14 +304,9 @@ int Diagnosis::extended()
 
 int Diagnosis::run()
 {
-	int status = split();
-	if (status == TACTUS_OK)
-		status = gate();
+	int status = gathered.run(*store);
 	if (status != TACTUS_OK)
 		return status;
-	gather();
-	for (Work &work : works)
-		prepare(work);
 	struct Task {
 		Diagnosis *self;
 		std::vector<std::string> failed;
@@ -618,8 +329,8 @@ int Diagnosis::run()
 							 ? options.device
 							 : tactus_metadata_get(tactus_table_metadata(recordings.front().table), "device");
 	for (Work &work : works) {
-		if (!work.outliers.empty() || !wild[work.channel].empty()) {
-			std::vector<size_t> rows = wild[work.channel];
+		if (!work.outliers.empty() || !gathered.wild[work.channel].empty()) {
+			std::vector<size_t> rows = gathered.wild[work.channel];
 			for (const size_t row : work.outliers)
 				for (const Run &run : work.problem->runs)
 					if (Index(row) >= run.first && Index(row) < run.first + run.count)
