@@ -49,7 +49,7 @@ DEPFLAGS = -MMD -MP
 
 LIB_C := $(wildcard src/*.c src/*/*.c src/*/*/*.c src/*/*/*/*.c)
 LIB_CXX := $(wildcard src/*/*.cpp)
-BENCHES := $(wildcard src/device/benches/*.toml)
+BENCHES := $(wildcard src/device/benches/*.toml src/device/profiles/*.toml)
 LIB_OBJ := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cpp=$(BUILD)/%.o) $(BUILD)/src/device/benches.o
 CLI_C := $(wildcard cli/*.c)
 CLI_OBJ := $(CLI_C:%.c=$(BUILD)/%.o)
@@ -106,7 +106,7 @@ $(BUILD)/src/%.o: src/%.cpp
 	@mkdir -p $(@D)
 	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(LIB_CXXFLAGS) $(CXXFLAGS_ALL) $(DEPFLAGS) -c $< -o $@
 
-# The built-in benches are in the library, as text.
+# The built-in benches and profiles are in the library, as text.
 $(BUILD)/src/device/benches.c: src/device/benches/embed.sh $(BENCHES) $(BUILD)/objects
 	@mkdir -p $(@D)
 	@sh src/device/benches/embed.sh $(BENCHES) >$@

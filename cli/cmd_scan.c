@@ -9,13 +9,13 @@
 #include "cli.h"
 #include "tare.h"
 
-enum { READINGS = 4096 };
+enum { READINGS = 4096, RECONNECT_S = 60 };
 
 /* A running scan, from the device's readings to the written records. */
 struct scan {
 	const struct cli *cli;
 	tactus_device *device;
-	bool raw;
+	bool raw, converts; /* converts: readings are amplitudes and phases, not raw and not something else */
 	tactus_table *table;
 	tactus_converter *converter;
 	tactus_model *model;
@@ -46,6 +46,12 @@ static unsigned modes(const char *text)
 								 : 0;
 }
 
+/* How long a lost device is looked for. */
+static double reconnect_s(const struct cli *cli)
+{
+	return cli_has(cli, "no-reconnect") ? 0 : cli_quantity(cli, "reconnect-timeout", RECONNECT_S);
+}
+
 static tactus_scan_settings settings(const struct cli *cli, const int *channels, size_t channel_count)
 {
 	tactus_scan_settings s = tactus_scan_defaults();
@@ -62,6 +68,8 @@ static tactus_scan_settings settings(const struct cli *cli, const int *channels,
 	s.loads = cli_string(cli, "loads", NULL);
 	s.seed = cli_integer(cli, "seed", 0);
 	s.realtime = cli_has(cli, "realtime");
+	s.timeout_s = cli_quantity(cli, "timeout", NAN);
+	s.reconnect_s = reconnect_s(cli);
 	return s;
 }
 
@@ -147,7 +155,7 @@ static int make_columns(struct scan *scan)
 	int error = tactus_table_resize(scan->table, 0);
 	for (size_t i = 0; i < tactus_metadata_count(from) && !error; i++)
 		error = tactus_metadata_set(to, tactus_metadata_key(from, i), tactus_metadata_value(from, i));
-	for (size_t i = 0; i < sizeof numbers / sizeof *numbers && !error && !scan->raw; i++) {
+	for (size_t i = 0; i < sizeof numbers / sizeof *numbers && !error && scan->converts; i++) {
 		if (!strcmp(numbers[i], "mode"))
 			tactus_table_set_texts(scan->table, numbers[i]);
 		else
@@ -160,8 +168,9 @@ static int make_columns(struct scan *scan)
 static int build(struct scan *scan)
 {
 	char fingerprint[17];
+	scan->converts = !scan->raw && tactus_device_has_amplitudes(scan->device);
 	int error = make_columns(scan);
-	if (!error && !scan->raw)
+	if (!error && scan->converts)
 		error = tactus_converter_new(scan->table, NULL, &scan->converter);
 	if (error || !scan->model)
 		return error;
@@ -226,6 +235,21 @@ static void show_progress(struct scan *scan, double since_s, bool end)
 		fprintf(stderr, "\r\033[Kscan %llu", (unsigned long long)done);
 }
 
+/* What is lost on the way is looked for, unless --no-reconnect; else as tactus_device_read(). */
+static long next_readings(struct scan *scan, tactus_reading *readings, size_t max)
+{
+	const long n = tactus_device_read(scan->device, readings, max);
+	if (n != TACTUS_ERR_LOST || cli_has(scan->cli, "no-reconnect"))
+		return n;
+	const double since_s = clock_s();
+	cli_note(scan->cli, "%s; looking for it for %g s", tactus_error_message(), reconnect_s(scan->cli));
+	const int error = tactus_device_recover(scan->device, reconnect_s(scan->cli));
+	if (error)
+		return error;
+	cli_note(scan->cli, "found again after %.3g s", clock_s() - since_s);
+	return TACTUS_ERR_INTERRUPTED; /* nothing came yet: the caller asks again */
+}
+
 /* --tare: the readings of the first second are held until it is over, since all of them are tared with their mean. */
 static int hold_first_second(struct scan *scan)
 {
@@ -243,13 +267,14 @@ static int hold_first_second(struct scan *scan)
 			readings = grown;
 		}
 		/* a few at a time, so that not much more than a second is held at full speed */
-		n = tactus_device_read(scan->device, readings + held, READINGS / 16);
+		n = next_readings(scan, readings + held, READINGS / 16);
 		held += n > 0 ? (size_t)n : 0;
+		n = n == TACTUS_ERR_INTERRUPTED ? 1 : n;
 	}
 	size_t second = 0;
 	while (second < held && readings[second].time_s < readings[0].time_s + 1)
 		second++;
-	int error = n < 0 && n != TACTUS_ERR_INTERRUPTED ? (int)n : 0;
+	int error = n < 0 ? (int)n : 0;
 	if (!error && second)
 		error = put(scan, readings, second, true);
 	if (!error && held > second)
@@ -264,7 +289,7 @@ static int acquire(struct scan *scan)
 	const double since_s = clock_s();
 	int error = !readings ? TACTUS_ERR_MEMORY : cli_has(scan->cli, "tare") ? hold_first_second(scan) : 0;
 	while (!error && !cli_signal) {
-		const long n = tactus_device_read(scan->device, readings, READINGS);
+		const long n = next_readings(scan, readings, READINGS);
 		if (n == 0)
 			break;
 		if (n == TACTUS_ERR_INTERRUPTED)
@@ -296,6 +321,29 @@ static int check_lost(const struct scan *scan, double share)
 	return CLI_OK;
 }
 
+/* What the link did wrong and was recovered from. */
+static void say_faults(const struct scan *scan)
+{
+	const tactus_faults faults = tactus_device_faults(scan->device);
+	const struct {
+		uint64_t count;
+		const char *what;
+	} kinds[] = {{faults.timeouts, "not answered in time"},
+				 {faults.corrupted, "corrupted"},
+				 {faults.exceptions, "refused"},
+				 {faults.mismatched, "answers to something else"},
+				 {faults.overruns, "lost by the device"},
+				 {faults.reconnections, "reconnected"}};
+	char text[256] = "";
+	size_t length = 0;
+	for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+		if (kinds[i].count)
+			length += (size_t)snprintf(text + length, sizeof text - length, "%s%s: %llu", length ? ", " : "",
+									   kinds[i].what, (unsigned long long)kinds[i].count);
+	if (length)
+		cli_note(scan->cli, "the link had faults (%s)", text);
+}
+
 /* The header is written only now that the device has started. */
 static int run_started(struct scan *scan, double share)
 {
@@ -310,6 +358,7 @@ static int run_started(struct scan *scan, double share)
 	if (!error)
 		error = acquire(scan);
 	int status = cli_fail(scan->cli, error);
+	say_faults(scan);
 	const int stopped = tactus_device_stop(scan->device);
 	const int closed = tactus_writer_close(scan->writer);
 	if (!error)
@@ -348,6 +397,17 @@ static int check_usage(const struct cli *cli)
 	return 0;
 }
 
+static int open_reference(const struct cli *cli, tactus_device *device)
+{
+	tactus_device *reference = NULL;
+	int error = tactus_device_open(cli_string(cli, "reference", NULL), &reference);
+	if (!error)
+		error = tactus_device_set_reference(device, reference);
+	if (error)
+		tactus_device_close(reference);
+	return error;
+}
+
 static int run(struct cli *cli)
 {
 	struct scan scan = {.cli = cli, .raw = cli_has(cli, "raw")};
@@ -370,6 +430,8 @@ static int run(struct cli *cli)
 		error = tactus_model_read(cli_string(cli, "model-file", NULL), &scan.model);
 	if (!error)
 		error = tactus_device_open(cli_argument(cli, 0), &scan.device);
+	if (!error && cli_has(cli, "reference"))
+		error = open_reference(cli, scan.device);
 	if (!error)
 		error = tactus_device_start(scan.device, &asked);
 	status = error ? cli_fail(cli, error) : run_started(&scan, share);
@@ -394,9 +456,11 @@ static const struct cli_option options[] = {
 	{"raw", 0, CLI_FLAG, NULL, NULL, "the detectors' own volts, not converted"},
 	CLI_OPTION_MODEL_FILE,
 	{"tare", 0, CLI_FLAG, NULL, NULL, "subtract each channel's mean force of the first second"},
+	{"reference", 0, CLI_STRING, "URI", NULL, "another device gives the force: a load cell, a scale"},
+	{"timeout", 0, CLI_QUANTITY, "TIME", "s", "how long the device may take to answer (default: its own)"},
 	{"max-lost", 0, CLI_STRING, "PERCENT", NULL, "exit with 5 if more scans are lost (default 1%)"},
 	{"no-reconnect", 0, CLI_FLAG, NULL, NULL, "end at once when the device is lost"},
-	{"reconnect-timeout", 0, CLI_QUANTITY, "TIME", "s", "wait so long for a lost device"},
+	{"reconnect-timeout", 0, CLI_QUANTITY, "TIME", "s", "look so long for a lost device (default 60s)"},
 	{"append", 0, CLI_FLAG, NULL, NULL, "continue FILE: its columns, its time, its scan numbers"},
 	CLI_OPTIONS_OUTPUT,
 	CLI_OPTIONS_FORMAT,
@@ -434,8 +498,16 @@ const struct cli_command cli_scan = {
 		"recording, raw or converted; --channels, --mode, --count and --duration choose from it.\n\n"
 		"With -m the force is estimated live. --tare holds back the first second, then subtracts from every estimate "
 		"the "
-		"mean of its channel in that second. A simulated or played device is never lost; --no-reconnect and "
-		"--reconnect-timeout are for those that can be.",
+		"mean of its channel in that second.\n\n"
+		"A real device that is unplugged or cut off is said to be lost in one line, looked for by its identity, even "
+		"under "
+		"another name, and when it is back the scan goes on in the same file: its clock and numbers kept counting, so "
+		"the "
+		"gap shows in sequence. With --no-reconnect, or when it is not back within --reconnect-timeout, the exit "
+		"status is "
+		"5. With --reference a second device is read at the same time, on the same clock; its force, linear between "
+		"its "
+		"samples, is force_N of every reading, missing where it has a gap. URIs are described in tactus-devices(7).",
 	.examples =
 		"tactus scan sim: -o run.csv                                       # eight simulated sensors, 0 to 250 N\n"
 		"tactus scan sim: --channels 3,1 --mode ac --count 100             # two channels, AC, a hundred scans\n"

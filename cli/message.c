@@ -151,6 +151,7 @@ static void on_signal(int number)
 	cli_signal = number;
 	signal(SIGINT, SIG_DFL);
 	signal(SIGTERM, SIG_DFL);
+	signal(SIGHUP, SIG_DFL);
 }
 
 void cli_catch_signals(void)
@@ -159,6 +160,9 @@ void cli_catch_signals(void)
 	sigemptyset(&action.sa_mask);
 	sigaction(SIGINT, &action, NULL);
 	sigaction(SIGTERM, &action, NULL);
+	struct sigaction hangup;
+	if (sigaction(SIGHUP, NULL, &hangup) == 0 && hangup.sa_handler != SIG_IGN) /* nohup(1) asks to go on */
+		sigaction(SIGHUP, &action, NULL);
 }
 
 /* An earlier write may have met the closed pipe and its errno be gone: the pipe itself still says so. */

@@ -37,7 +37,7 @@ typedef struct tactus_device tactus_device;
 
 enum tactus_mode { TACTUS_MODE_DC = 1, TACTUS_MODE_AC = 2 };
 
-/** What to acquire. Zero, NULL or NaN: the device's default. */
+/** What to acquire. Zero, NULL or NaN: the device's default. Begin with tactus_scan_defaults(). */
 typedef struct {
 	const int *channels; /**< in the order of the scan */
 	size_t channel_count;
@@ -52,10 +52,14 @@ typedef struct {
 	const char *loads;    /**< "standard" or a file: known R ∥ C in place of the sensors (simulated benches only) */
 	uint64_t seed;        /**< simulated benches; 0: the bench's own */
 	bool realtime;        /**< simulated and replayed devices: pace by the clock */
+	double timeout_s;     /**< how long a real device may take to answer one request */
+	double reconnect_s;   /**< how long a lost reference is looked for (INFINITY: without end; the default) */
 } tactus_scan_settings;
 
 /** All defaults. */
 TACTUS_API tactus_scan_settings tactus_scan_defaults(void);
+
+enum { TACTUS_EXTRAS_MAX = 16, TACTUS_EXTRA_SIZE = 48 };
 
 /** One reading as the device gives it. NaN where it has no such value. */
 typedef struct {
@@ -69,7 +73,18 @@ typedef struct {
 	double force_N, temperature_degC;
 	double reference_resistance_ohm, reference_capacitance_F; /**< known loads */
 	unsigned quality;
+	double extra[TACTUS_EXTRAS_MAX]; /**< further columns, as many as tactus_device_extra() names */
 } tactus_reading;
+
+/** What went wrong on the link since the device was opened, and was seen: nothing of it was given as a reading. */
+typedef struct {
+	uint64_t timeouts;      /**< no answer, or half of one, in time */
+	uint64_t corrupted;     /**< a checksum or a frame that is wrong, a line that does not parse */
+	uint64_t exceptions;    /**< requests that the device refused */
+	uint64_t mismatched;    /**< answers to another request, of another unit or another length */
+	uint64_t overruns;      /**< readings that the device itself says it lost */
+	uint64_t reconnections; /**< times that the link was lost and found again */
+} tactus_faults;
 
 /** Opens a device by its URI. TACTUS_ERR_DEVICE or TACTUS_ERR_PERMISSION; close with tactus_device_close(). */
 TACTUS_API int tactus_device_open(const char *uri, tactus_device **device);
@@ -82,6 +97,27 @@ TACTUS_API int tactus_device_start(tactus_device *device, const tactus_scan_sett
  */
 TACTUS_API long tactus_device_read(tactus_device *device, tactus_reading *readings, size_t max);
 TACTUS_API int tactus_device_stop(tactus_device *device);
+/**
+ * After TACTUS_ERR_LOST: finds the device again by its identity, even under another name, and goes on with the running
+ * scan, whose clock and numbers went on counting. Tries at once, then with growing pauses of at most 2 s in which
+ * nothing is done, for timeout_s (INFINITY: without end) or until the scan would be over. TACTUS_ERR_LOST if it did not
+ * come back, TACTUS_ERR_INTERRUPTED if a signal came while it waited.
+ */
+TACTUS_API int tactus_device_recover(tactus_device *device, double timeout_s);
+TACTUS_API tactus_faults tactus_device_faults(const tactus_device *device);
+/** Whether the running scan's readings have amplitudes and phases, to be converted; else further columns alone. */
+TACTUS_API bool tactus_device_has_amplitudes(const tactus_device *device);
+/** The name of the i-th further column that the running scan's readings have, NULL past the last. Owned by the device.
+ */
+TACTUS_API const char *tactus_device_extra(const tactus_device *device, size_t i);
+/**
+ * Another device gives the reference: its force, on the same monotonic clock, is put beside every reading of the scans
+ * that start from now on, linearly between its samples (a reading waits for the sample after it; where none comes the
+ * force is missing). `device` owns `reference` from now on, starts, reads (in a thread of its own), recovers and closes
+ * it. Delay and jitter of both streams are measured at the start and said in the metadata. TACTUS_ERR_UNSUPPORTED if
+ * one of the two does not run by the clock; `reference` is then still the caller's.
+ */
+TACTUS_API int tactus_device_set_reference(tactus_device *device, tactus_device *reference);
 /** What a recording of this scan says in its metadata (identity, rates, Rg, detectors, ADC); owned by the device. */
 TACTUS_API const tactus_metadata *tactus_device_metadata(const tactus_device *device);
 /** Number of scans that the running scan will have, 0 if it is not known: for a progress display. */

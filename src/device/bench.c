@@ -192,6 +192,10 @@ static int check(const tactus_toml_node *root, const tactus_bench *bench)
 	if (!(bench->adc.maximum_V > bench->adc.minimum_V) || bench->adc.bits != floor(bench->adc.bits))
 		return tactus_toml_fail(root, "adc", TACTUS_ERR_INPUT,
 								"the converter needs whole bits and a maximum_V above its minimum_V");
+	if (bench->wiring.present && bench->wiring.switch_count != 0 && bench->wiring.switch_count != bench->sensor_count)
+		return tactus_toml_fail(root, "wiring", TACTUS_ERR_INPUT,
+								"switch_lines has %zu lines for %zu sensors, which are in the order of their channels",
+								bench->wiring.switch_count, bench->sensor_count);
 	if (tactus_protocol_parse(bench->protocol, 1, &protocol) < 0)
 		return tactus_toml_fail(root, "protocol", TACTUS_ERR_INPUT, "%s", tactus_error_message());
 	tactus_protocol_free(protocol);
@@ -237,6 +241,8 @@ static int read_file(const char *name, const char *text, int depth, tactus_bench
 	if (code >= 0)
 		code = read_modes(root, bench);
 	if (code >= 0)
+		code = tactus_bench_read_wiring(root, bench);
+	if (code >= 0)
 		code = tactus_bench_read_sensors(root, bench);
 	if (code >= 0)
 		code = tactus_bench_read_effects(root, BASES_MAX - depth, bench);
@@ -262,6 +268,14 @@ static void set_defaults(tactus_bench *bench)
 	bench->reference.present = true;
 	bench->temperature.base_degC = 25;
 	bench->temperature.period_s = INFINITY;
+	bench->wiring = (tactus_wiring){
+		.source_line = -1,
+		.dc_output = -1,
+		.dc_output_gain = 1,
+		.amplitude_input = -1,
+		.phase_input = -1,
+		.dc_input = -1,
+	};
 }
 
 int tactus_bench_open(const char *name, tactus_bench **result)

@@ -35,6 +35,20 @@ typedef struct {
 	tactus_bench_effects readout; /* on the electronics while this channel is selected */
 } tactus_bench_sensor;
 
+/* How a bench hangs on a data acquisition device: which of its lines, outputs and inputs do what. −1: none. */
+typedef struct {
+	bool present;                               /* the file has a [wiring] */
+	int switch_lines[TACTUS_BENCH_SENSORS_MAX]; /* digital line that closes the switch of the i-th sensor */
+	size_t switch_count;
+	bool switch_active_low; /* the polarity of the switches' logic inputs */
+	int source_line;        /* line that selects the source: AC when high, unless: */
+	bool source_ac_low;
+	int dc_output;         /* analog output that is the DC source */
+	double dc_output_gain; /* volts at the sensors per volt of that output */
+	int amplitude_input, phase_input, dc_input;
+	double input_range_V; /* largest magnitude that the inputs are set to take; 0: the device's widest */
+} tactus_wiring;
+
 typedef struct {
 	char *name, *description, *start, *protocol;
 	double seed, lost_scans;
@@ -70,6 +84,7 @@ typedef struct {
 		double base_degC, ramp_degC_per_s, amplitude_degC, period_s, noise_degC, resolution_degC;
 		bool present;
 	} temperature;
+	tactus_wiring wiring;
 	tactus_bench_sensor sensors[TACTUS_BENCH_SENSORS_MAX]; /* in the order of their channels */
 	size_t sensor_count;
 } tactus_bench;
@@ -84,6 +99,10 @@ const char *tactus_builtin_find(const char *name);
 /* A built-in bench by name, or a file. TACTUS_ERR_DEVICE if it is neither, TACTUS_ERR_INPUT with FILE:LINE:COLUMN. */
 int tactus_bench_open(const char *name, tactus_bench **bench);
 void tactus_bench_free(tactus_bench *bench);
+/* Volts of one code of its converter. */
+double tactus_bench_step_V(const tactus_bench *bench);
+/* Rg, detectors, ADC, their uncertainties and limits for the modes of a scan. */
+int tactus_bench_metadata(const tactus_bench *bench, unsigned modes, tactus_metadata *metadata);
 /* The sensor on a channel, or NULL. */
 const tactus_bench_sensor *tactus_bench_find(const tactus_bench *bench, int channel);
 

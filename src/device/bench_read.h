@@ -18,6 +18,8 @@ typedef struct {
 int tactus_bench_read_key(const tactus_toml_node *table, const tactus_bench_key *key, void *object);
 /* [every_sensor] and [[sensor]]: adds to and changes those that are there. */
 int tactus_bench_read_sensors(const tactus_toml_node *root, tactus_bench *bench);
+/* [wiring]: how the bench hangs on a data acquisition device. */
+int tactus_bench_read_wiring(const tactus_toml_node *root, tactus_bench *bench);
 /* [[effect]]; `file` numbers the files, later ones higher, so that a file replaces what its base set. */
 int tactus_bench_read_effects(const tactus_toml_node *root, int file, tactus_bench *bench);
 

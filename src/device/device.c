@@ -1,5 +1,4 @@
 /* Devices by URI: finds the backend in a const table and hands on. */
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,6 +7,10 @@
 
 #include "core/core.h"
 #include "device/device.h"
+#include "device/reference.h"
+
+#define PAUSE_FIRST_S 0.1 /* between attempts to find a lost device, doubled up to: */
+#define PAUSE_LAST_S 2
 
 static const tactus_backend *const backends[] = {&tactus_backend_sim, &tactus_backend_replay};
 
@@ -23,8 +26,13 @@ static int fail_unknown_scheme(const char *uri)
 
 tactus_scan_settings tactus_scan_defaults(void)
 {
-	const tactus_scan_settings settings = {
-		.drive_V = NAN, .frequency_Hz = NAN, .rate_Hz = NAN, .settle_s = NAN, .duration_s = NAN};
+	const tactus_scan_settings settings = {.drive_V = NAN,
+										   .frequency_Hz = NAN,
+										   .rate_Hz = NAN,
+										   .settle_s = NAN,
+										   .duration_s = NAN,
+										   .timeout_s = NAN,
+										   .reconnect_s = INFINITY};
 	return settings;
 }
 
@@ -61,30 +69,79 @@ void tactus_device_close(tactus_device *device)
 		return;
 	tactus_device_stop(device);
 	device->backend->close(device);
+	tactus_reference_free(device->reference);
 	tactus_metadata_free(device->metadata);
 	free(device);
 }
 
+/* ---- a scan ---- */
+
 /* A new scan says everything anew. */
-static int clear_metadata(tactus_device *device)
+static int clear(tactus_device *device)
 {
 	tactus_metadata *metadata = tactus_metadata_new();
 	if (metadata == NULL)
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	tactus_metadata_free(device->metadata);
 	device->metadata = metadata;
+	device->timing = (tactus_timing){0};
+	device->extras[0][0] = '\0';
+	device->lost_ns = 0;
 	return TACTUS_OK;
+}
+
+/* What is given by a request was true half a round trip before the answer came. */
+static int say_timing(tactus_device *device)
+{
+	int code = TACTUS_OK;
+	if (device->timing.n > 0) {
+		code = tactus_metadata_set_number(device->metadata, "device_delay_s", device->timing.mean_s / 2);
+		code = code < 0 ? code
+						: tactus_metadata_set_number(device->metadata, "device_jitter_s",
+													 tactus_timing_std_s(&device->timing));
+	}
+	return code < 0 || device->reference == NULL ? code : tactus_reference_say(device->reference, device->metadata);
+}
+
+/* What only a simulation can do is refused; on a real bench the load is applied by hand, and ends the scan all the
+ * same. */
+static int settle_live(tactus_device *device, tactus_scan_settings *settings)
+{
+	tactus_protocol *protocol = NULL;
+	const char *impossible = settings->loads != NULL ? "put known loads in the sensors' places"
+							 : settings->seed != 0   ? "have a seed"
+													 : NULL;
+	if (impossible != NULL)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "a real bench cannot %s", impossible);
+	if (!isnan(settings->duration_s) && !(settings->duration_s > 0))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "the duration must be above zero");
+	if (settings->protocol == NULL)
+		return TACTUS_OK;
+	const int code = tactus_protocol_parse(settings->protocol, 1, &protocol);
+	if (code < 0)
+		return code;
+	settings->duration_s = fmin(settings->duration_s, tactus_protocol_duration_s(protocol));
+	tactus_protocol_free(protocol);
+	return tactus_metadata_set(device->metadata, "protocol", settings->protocol);
 }
 
 int tactus_device_start(tactus_device *device, const tactus_scan_settings *settings)
 {
-	const tactus_scan_settings defaults = tactus_scan_defaults();
+	tactus_scan_settings asked = settings != NULL ? *settings : tactus_scan_defaults();
 	int code = tactus_device_stop(device);
 	if (code >= 0)
-		code = clear_metadata(device);
+		code = clear(device);
+	if (code >= 0 && device->backend->live)
+		code = settle_live(device, &asked);
+	if (code >= 0 && device->reference != NULL)
+		code = tactus_reference_start(device->reference, &asked);
 	if (code >= 0)
-		code = device->backend->start(device, settings != NULL ? settings : &defaults);
+		code = device->backend->start(device, &asked);
 	device->running = code >= 0;
+	if (code >= 0)
+		code = say_timing(device);
+	if (code < 0 && device->reference != NULL)
+		tactus_reference_stop(device->reference);
 	return code;
 }
 
@@ -92,7 +149,13 @@ long tactus_device_read(tactus_device *device, tactus_reading *readings, size_t 
 {
 	if (!device->running || max == 0)
 		return 0;
-	return device->backend->read(device, readings, max);
+	if (device->lost_ns != 0)
+		return tactus_live_over(&device->live) ? 0 : tactus_fail(TACTUS_ERR_LOST, "the device was lost");
+	const long n = device->reference != NULL ? tactus_reference_read(device->reference, device, readings, max)
+											 : device->backend->read(device, readings, max);
+	if (n == TACTUS_ERR_LOST)
+		device->lost_ns = tactus_clock_ns();
+	return n;
 }
 
 int tactus_device_stop(tactus_device *device)
@@ -100,7 +163,105 @@ int tactus_device_stop(tactus_device *device)
 	if (!device->running)
 		return TACTUS_OK;
 	device->running = false;
-	return device->backend->stop != NULL ? device->backend->stop(device) : TACTUS_OK;
+	const int code = device->backend->stop != NULL ? device->backend->stop(device) : TACTUS_OK;
+	if (device->reference != NULL)
+		tactus_reference_stop(device->reference);
+	return device->lost_ns != 0 ? TACTUS_OK : code; /* what is gone cannot be stopped */
+}
+
+/* ---- losing and finding ---- */
+
+/* Waits in pieces, so that another thread can call it off. */
+static int pause_between(tactus_device *device, double seconds)
+{
+	const int64_t piece_ns = 100000000, until_ns = tactus_clock_ns() + (int64_t)(1e9 * seconds);
+	int code = TACTUS_OK;
+	while (code >= 0 && tactus_clock_ns() < until_ns && !device->cancelled) {
+		const int64_t next_ns = tactus_clock_ns() + piece_ns;
+		code = tactus_clock_wait(next_ns < until_ns ? next_ns : until_ns);
+	}
+	return device->cancelled ? tactus_fail(TACTUS_ERR_INTERRUPTED, "called off") : code;
+}
+
+int tactus_device_recover(tactus_device *device, double timeout_s)
+{
+	const int64_t began_ns = tactus_clock_ns();
+	const int64_t lost_ns = device->lost_ns != 0 ? device->lost_ns : began_ns;
+	double pause_s = PAUSE_FIRST_S;
+	if (device->reference != NULL && tactus_reference_error(device->reference) < 0)
+		return tactus_reference_error(device->reference);
+	if (device->backend->reopen == NULL)
+		return tactus_fail(TACTUS_ERR_LOST, "a %s: device that was lost cannot be found again",
+						   device->backend->scheme);
+	for (;;) {
+		const int code = device->backend->reopen(device);
+		if (code >= 0) {
+			device->lost_ns = 0;
+			device->faults.reconnections++;
+			tactus_live_gap(&device->live, 1e-9 * (double)(tactus_clock_ns() - lost_ns));
+			return TACTUS_OK;
+		}
+		if (code == TACTUS_ERR_INTERRUPTED || tactus_live_over(&device->live))
+			return code == TACTUS_ERR_INTERRUPTED ? code : TACTUS_OK;
+		const double left_s = timeout_s - 1e-9 * (double)(tactus_clock_ns() - began_ns);
+		if (!(left_s > 0))
+			return tactus_fail(TACTUS_ERR_LOST, "lost and not found again within %g s: %s", timeout_s,
+							   tactus_error_message());
+		const int waited = pause_between(device, fmin(pause_s, left_s));
+		if (waited < 0)
+			return waited;
+		pause_s = fmin(2 * pause_s, PAUSE_LAST_S);
+	}
+}
+
+tactus_faults tactus_device_faults(const tactus_device *device)
+{
+	tactus_faults sum = device->faults;
+	if (device->reference != NULL)
+		tactus_reference_add_faults(device->reference, &sum);
+	return sum;
+}
+
+/* ---- what it says ---- */
+
+int tactus_device_add_extra(tactus_device *device, const char *name)
+{
+	size_t i = 0;
+	while (i < TACTUS_EXTRAS_MAX && device->extras[i][0] != '\0')
+		i++;
+	if (i == TACTUS_EXTRAS_MAX || strlen(name) >= TACTUS_EXTRA_SIZE)
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "column '%s': at most %d further columns, of at most %d letters each",
+						   name, TACTUS_EXTRAS_MAX, TACTUS_EXTRA_SIZE - 1);
+	snprintf(device->extras[i], TACTUS_EXTRA_SIZE, "%s", name);
+	if (i + 1 < TACTUS_EXTRAS_MAX)
+		device->extras[i + 1][0] = '\0';
+	return TACTUS_OK;
+}
+
+bool tactus_device_has_amplitudes(const tactus_device *device)
+{
+	return !device->has_no_amplitudes;
+}
+
+const char *tactus_device_extra(const tactus_device *device, size_t i)
+{
+	return i < TACTUS_EXTRAS_MAX && device->extras[i][0] != '\0' ? device->extras[i] : NULL;
+}
+
+int tactus_device_set_reference(tactus_device *device, tactus_device *reference)
+{
+	if (!device->backend->live || !reference->backend->live)
+		return tactus_fail(TACTUS_ERR_UNSUPPORTED,
+						   "%s: does not run by the clock: a reference needs two real devices (emulated ones will do); "
+						   "what was recorded apart is joined by `tactus join`",
+						   device->backend->live ? reference->backend->scheme : device->backend->scheme);
+	struct tactus_reference *made = tactus_reference_new(reference);
+	if (made == NULL)
+		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	tactus_device_stop(device);
+	tactus_reference_free(device->reference);
+	device->reference = made;
+	return TACTUS_OK;
 }
 
 const tactus_metadata *tactus_device_metadata(const tactus_device *device)
@@ -123,18 +284,10 @@ int tactus_device_list(bool (*found)(void *context, const char *uri, const char 
 
 int tactus_pace_wait(tactus_pace *pace, double time_s)
 {
-	struct timespec now, until;
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	if (!pace->started) {
-		pace->started = true;
-		pace->origin_ns = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec - (int64_t)llround(time_s * 1e9);
-		return TACTUS_OK;
-	}
-	const int64_t at = pace->origin_ns + (int64_t)llround(time_s * 1e9);
-	until.tv_sec = (time_t)(at / 1000000000);
-	until.tv_nsec = (long)(at % 1000000000);
-	if (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL) == EINTR)
-		return tactus_fail(TACTUS_ERR_INTERRUPTED, "interrupted while waiting for a scan");
+	if (pace->started)
+		return tactus_clock_wait(pace->origin_ns + (int64_t)llround(time_s * 1e9));
+	pace->started = true;
+	pace->origin_ns = tactus_clock_ns() - (int64_t)llround(time_s * 1e9);
 	return TACTUS_OK;
 }
 

@@ -79,13 +79,25 @@ static void put_mode(job *j)
 		column[i] = (tactus_text){j->readings[i].mode == TACTUS_MODE_DC ? "dc" : "ac", 2};
 }
 
-/* A device alone knows of clipping, which is therefore the only flag but "ok" that it sets. */
 static void put_quality(job *j)
 {
 	tactus_text *column = j->code < 0 ? NULL : tactus_table_set_texts(j->table, "quality");
 	for (size_t i = 0; i < j->n && column != NULL; i++)
-		column[i] = (j->readings[i].quality & TACTUS_QUALITY_CLIPPED) != 0 ? (tactus_text){"clipped", 7}
-																		   : (tactus_text){"ok", 2};
+		column[i] = tactus_quality_name(j->readings[i].quality);
+}
+
+/* What a device that reads sensors through an amplifier has beside the time. */
+static void put_amplitudes(job *j, bool raw)
+{
+	const unsigned modes = j->device->modes;
+	put_mode(j);
+	PUT(j, true, drive_V);
+	PUT(j, true, frequency_Hz);
+	put_computed(j, !raw, "amplitude_V", amplitude_V);
+	put_computed(j, !raw, "phase_rad", phase_rad);
+	PUT(j, raw && (modes & TACTUS_MODE_AC) != 0, detector_amplitude_V);
+	PUT(j, raw && (modes & TACTUS_MODE_AC) != 0, detector_phase_V);
+	PUT(j, raw && (modes & TACTUS_MODE_DC) != 0, detector_dc_V);
 }
 
 int tactus_device_table(const tactus_device *device, const tactus_reading *readings, size_t n, bool raw,
@@ -100,17 +112,13 @@ int tactus_device_table(const tactus_device *device, const tactus_reading *readi
 		j.code = tactus_table_resize(table, n);
 	PUT(&j, true, time_s);
 	put_computed(&j, true, "sequence", sequence);
-	put_computed(&j, true, "channel", channel);
-	put_mode(&j);
-	PUT(&j, true, drive_V);
-	PUT(&j, true, frequency_Hz);
-	put_computed(&j, !raw, "amplitude_V", amplitude_V);
-	put_computed(&j, !raw, "phase_rad", phase_rad);
-	PUT(&j, raw && (device->modes & TACTUS_MODE_AC) != 0, detector_amplitude_V);
-	PUT(&j, raw && (device->modes & TACTUS_MODE_AC) != 0, detector_phase_V);
-	PUT(&j, raw && (device->modes & TACTUS_MODE_DC) != 0, detector_dc_V);
+	put_computed(&j, !device->has_no_amplitudes || device->has_channels, "channel", channel);
+	if (!device->has_no_amplitudes)
+		put_amplitudes(&j, raw);
+	for (size_t i = 0; i < TACTUS_EXTRAS_MAX && device->extras[i][0] != '\0'; i++)
+		put_field(&j, true, device->extras[i], offsetof(tactus_reading, extra) + i * sizeof(double));
 	put_quality(&j);
-	PUT(&j, device->has_force, force_N);
+	PUT(&j, device->has_force || device->reference != NULL, force_N);
 	PUT(&j, device->has_temperature, temperature_degC);
 	PUT(&j, device->has_reference, reference_resistance_ohm);
 	PUT(&j, device->has_reference, reference_capacitance_F);

@@ -188,7 +188,9 @@ static tactus_reading row_reading(const replay *r, size_t row)
 		.temperature_degC = number_at(block, "temperature_degC", row, NAN),
 		.reference_resistance_ohm = number_at(block, "reference_resistance_ohm", row, NAN),
 		.reference_capacitance_F = number_at(block, "reference_capacitance_F", row, NAN),
-		.quality = quality != NULL ? tactus_quality_parse(quality[row].text, quality[row].length) : 0,
+		/* what else it says was judged from the numbers, which are judged anew */
+		.quality =
+			quality == NULL ? 0 : tactus_quality_parse(quality[row].text, quality[row].length) & TACTUS_QUALITY_CLIPPED,
 	};
 }
 

@@ -9,8 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <tactus/version.h>
-
 #include "core/core.h"
 #include "core/random.h"
 #include "device/sim.h"
@@ -21,7 +19,7 @@ enum { BLOCK_SCANS = 64, BLOCK_FIELDS = 11 };
 
 static void free_scan(tactus_sim *sim)
 {
-	for (size_t i = 0; i < sim->channel_count && sim->sensors != NULL; i++)
+	for (size_t i = 0; i < sim->plan.channel_count && sim->sensors != NULL; i++)
 		sim_sensor_free(&sim->sensors[i]);
 	free(sim->sensors);
 	sim_electronics_free(&sim->electronics);
@@ -37,9 +35,9 @@ static void free_scan(tactus_sim *sim)
 /* An effect that looks ahead needs the whole scan in one block. */
 static size_t scans_per_block(const tactus_sim *sim)
 {
-	for (size_t i = 0; i < sim->channel_count; i++)
-		for (size_t k = 0; k < sim->scanned[i]->effects.count; k++)
-			if ((sim->scanned[i]->effects.item[k].effect->flags & TACTUS_EFFECT_LOOKAHEAD) != 0)
+	for (size_t i = 0; i < sim->plan.channel_count; i++)
+		for (size_t k = 0; k < sim->plan.scanned[i]->effects.count; k++)
+			if ((sim->plan.scanned[i]->effects.item[k].effect->flags & TACTUS_EFFECT_LOOKAHEAD) != 0)
 				return (size_t)sim->scan_count;
 	return sim->scan_count < BLOCK_SCANS ? (size_t)sim->scan_count : BLOCK_SCANS;
 }
@@ -48,7 +46,7 @@ static int allocate_block(tactus_sim *sim)
 {
 	sim_block *block = &sim->block;
 	sim->block_scans = scans_per_block(sim);
-	const size_t n = sim->block_scans * sim->channel_count * sim->mode_count;
+	const size_t n = sim->block_scans * sim->plan.channel_count * sim->plan.mode_count;
 	block->capacity = n;
 	block->memory = calloc(n, BLOCK_FIELDS * sizeof(double));
 	block->readings = calloc(n, sizeof(*block->readings));
@@ -67,25 +65,15 @@ static int allocate_block(tactus_sim *sim)
 static int start_parts(tactus_sim *sim)
 {
 	int code = sim->loads != NULL ? TACTUS_OK : sim_press_start(&sim->press, sim->bench, sim->protocol);
-	sim->sensors = calloc(sim->channel_count, sizeof(*sim->sensors));
+	sim->sensors = calloc(sim->plan.channel_count, sizeof(*sim->sensors));
 	if (code >= 0 && sim->sensors == NULL)
 		code = tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
-	for (size_t i = 0; i < sim->channel_count && code >= 0; i++)
-		code = sim_sensor_start(&sim->sensors[i], sim->bench, sim->scanned[i], sim->seed, sim->protocol);
+	for (size_t i = 0; i < sim->plan.channel_count && code >= 0; i++)
+		code = sim_sensor_start(&sim->sensors[i], sim->bench, sim->plan.scanned[i], sim->seed, sim->protocol);
 	if (code >= 0)
-		code = sim_electronics_start(&sim->electronics, sim->bench, sim->scanned, sim->channel_count, sim->settle_s,
-									 sim->seed);
+		code = sim_electronics_start(&sim->electronics, sim->bench, sim->plan.scanned, sim->plan.channel_count,
+									 sim->plan.settle_s, sim->seed);
 	return code < 0 ? code : allocate_block(sim);
-}
-
-static int set_channels(const tactus_sim *sim, tactus_metadata *metadata)
-{
-	char text[TACTUS_BENCH_SENSORS_MAX * 6] = "";
-	size_t length = 0;
-	for (size_t i = 0; i < sim->channel_count; i++)
-		length +=
-			(size_t)snprintf(text + length, sizeof(text) - length, "%s%d", i > 0 ? "," : "", sim->scanned[i]->channel);
-	return tactus_metadata_set(metadata, "channels", text);
 }
 
 /* A protocol of several lines is one line in a recording. */
@@ -105,30 +93,19 @@ static int set_protocol(tactus_metadata *metadata, const char *protocol)
 /* What a recording may know; effects of the bench file are not told. */
 static int set_metadata(const tactus_sim *sim, const tactus_scan_settings *settings, tactus_metadata *m)
 {
-	char now[32], identity[128];
-	const bool ac = (sim->modes & TACTUS_MODE_AC) != 0, dc = (sim->modes & TACTUS_MODE_DC) != 0;
-	tactus_now_text(now);
+	char identity[128];
+	const tactus_plan *plan = &sim->plan;
 	snprintf(identity, sizeof(identity), "sim:%s", sim->bench->name != NULL ? sim->bench->name : "");
-	int code = tactus_metadata_set(m, "tactus", tactus_version());
-	const char *start = sim->realtime || sim->bench->start == NULL ? now : sim->bench->start;
-	code = code < 0 ? code : tactus_metadata_set(m, "start", start);
-	code = code < 0 ? code : tactus_metadata_set(m, "device", identity);
-	code = code < 0 ? code : tactus_metadata_set_number(m, "rate_requested_Hz", sim->rate_Hz);
-	code = code < 0 ? code : tactus_metadata_set_number(m, "rate_Hz", 1 / sim->period_s);
-	code = code < 0 ? code : set_channels(sim, m);
-	code = code < 0 ? code : tactus_metadata_set(m, "modes", ac && dc ? "dc,ac" : ac ? "ac" : "dc");
-	if (ac && (sim->loads == NULL || sim->loads->drive_count < 2))
-		code = code < 0 ? code : tactus_metadata_set_number(m, "drive_V", sim->drive_V);
-	if (dc)
-		code = code < 0 ? code : tactus_metadata_set_number(m, "dc_drive_V", sim->dc_drive_V);
-	if (ac && (sim->loads == NULL || sim->loads->frequency_count < 2))
-		code = code < 0 ? code : tactus_metadata_set_number(m, "frequency_Hz", sim->frequency_Hz);
-	code = code < 0 ? code : tactus_metadata_set_number(m, "settle_s", sim->settle_s);
+	int code = tactus_plan_metadata(plan, identity, sim->realtime ? NULL : sim->bench->start, m);
+	if (sim->loads != NULL && sim->loads->drive_count > 1)
+		code = code < 0 ? code : tactus_metadata_set(m, "drive_V", NULL);
+	if (sim->loads != NULL && sim->loads->frequency_count > 1)
+		code = code < 0 ? code : tactus_metadata_set(m, "frequency_Hz", NULL);
 	if (sim->loads == NULL)
 		code =
 			code < 0 ? code : set_protocol(m, settings->protocol != NULL ? settings->protocol : sim->bench->protocol);
 	code = code < 0 ? code : tactus_metadata_set_number(m, "seed", (double)sim->seed);
-	return code < 0 ? code : sim_electronics_metadata(sim->bench, sim->modes, m);
+	return code < 0 ? code : tactus_bench_metadata(sim->bench, plan->modes, m);
 }
 
 static int sim_start(tactus_device *device, const tactus_scan_settings *settings)
@@ -141,7 +118,7 @@ static int sim_start(tactus_device *device, const tactus_scan_settings *settings
 	code = code < 0 ? code : start_parts(sim);
 	code = code < 0 ? code : set_metadata(sim, settings, device->metadata);
 	device->expected_scans = sim->scan_count;
-	device->modes = sim->modes;
+	device->modes = sim->plan.modes;
 	device->has_detectors = true;
 	device->has_reference = sim->loads != NULL;
 	device->has_force = sim->loads == NULL && sim->bench->reference.present;
@@ -178,7 +155,9 @@ static bool sim_list(bool (*found)(void *context, const char *uri, const char *d
 		if (strncmp(file->name, "loads-", 6) == 0 || tactus_bench_open(file->name, &bench) < 0)
 			continue;
 		snprintf(uri, sizeof(uri), "sim:%s", file->name);
-		const bool more = found(context, uri, bench->description != NULL ? bench->description : "");
+		/* one with a wiring is the profile of a real bench */
+		const bool more =
+			bench->wiring.present || found(context, uri, bench->description != NULL ? bench->description : "");
 		tactus_bench_free(bench);
 		if (!more)
 			return false;
@@ -221,50 +200,44 @@ static void plan_scan(tactus_sim *sim, uint64_t scan, size_t *next)
 {
 	static const enum tactus_mode modes[] = {TACTUS_MODE_DC, TACTUS_MODE_AC};
 	sim_block *block = &sim->block;
-	double time_s = (double)scan * sim->period_s, drive_V = sim->drive_V, frequency_Hz = sim->frequency_Hz;
+	double time_s = (double)scan * sim->plan.period_s, drive_V = sim->plan.drive_V,
+		   frequency_Hz = sim->plan.frequency_Hz;
 	tactus_loads_turn turn = {0};
 	if (sim->loads != NULL) {
-		turn = tactus_loads_turn_at(sim->loads, sim->channel_count, scan);
+		turn = tactus_loads_turn_at(sim->loads, sim->plan.channel_count, scan);
 		drive_V = sim->loads->drive_count > 0 ? sim->loads->drives_V[turn.drive] : drive_V;
 		frequency_Hz = sim->loads->frequency_count > 0 ? sim->loads->frequencies_Hz[turn.frequency] : frequency_Hz;
 	}
-	for (size_t position = 0; position < sim->channel_count; position++)
+	for (size_t position = 0; position < sim->plan.channel_count; position++)
 		for (size_t m = 0; m < TACTUS_COUNT(modes); m++) {
-			if ((sim->modes & modes[m]) == 0)
+			if ((sim->plan.modes & modes[m]) == 0)
 				continue;
 			const size_t k = (*next)++;
 			const bool dc = modes[m] == TACTUS_MODE_DC;
 			const double window_s = sim_window_s(sim->bench, dc ? 0 : frequency_Hz);
-			const double at_s = round((time_s + sim->settle_s + window_s / 2) * SIM_TICKS_PER_S) / SIM_TICKS_PER_S;
+			const double at_s =
+				round((time_s + sim->plan.settle_s + window_s / 2) * TACTUS_TICKS_PER_S) / TACTUS_TICKS_PER_S;
 			tactus_reading *reading = &block->readings[k];
-			*reading = (tactus_reading){at_s,
-										scan,
-										sim->scanned[position]->channel,
-										modes[m],
-										dc ? sim->dc_drive_V : drive_V,
-										dc ? 0 : frequency_Hz,
-										NAN,
-										NAN,
-										NAN,
-										NAN,
-										NAN,
-										NAN,
-										NAN,
-										NAN,
-										NAN,
-										TACTUS_QUALITY_OK};
-			time_s += sim->settle_s + window_s;
+			*reading = tactus_reading_empty();
+			reading->time_s = at_s;
+			reading->sequence = scan;
+			reading->channel = sim->plan.scanned[position]->channel;
+			reading->mode = modes[m];
+			reading->drive_V = dc ? sim->plan.dc_drive_V : drive_V;
+			reading->frequency_Hz = dc ? 0 : frequency_Hz;
+			time_s += sim->plan.settle_s + window_s;
 			block->time_s[k] = at_s;
 			block->drive_V[k] = reading->drive_V;
 			block->frequency_Hz[k] = reading->frequency_Hz;
 			block->channel[k] = reading->channel;
 			block->temperature_degC[k] = sim_temperature_degC(sim->bench, at_s);
 			if (sim->loads != NULL)
-				put_load(sim, tactus_loads_at(sim->loads, sim->channel_count, &turn, position, sim->seed), k);
+				put_load(sim, tactus_loads_at(sim->loads, sim->plan.channel_count, &turn, position, sim->seed), k);
 			else
 				block->force_N[k] = sim_press_load_N(&sim->press, at_s);
-			read_instruments(sim, sim->scanned[position],
-							 scan * sim->channel_count * sim->mode_count + k % (sim->channel_count * sim->mode_count),
+			read_instruments(sim, sim->plan.scanned[position],
+							 scan * sim->plan.channel_count * sim->plan.mode_count +
+								 k % (sim->plan.channel_count * sim->plan.mode_count),
 							 at_s, reading);
 		}
 }
@@ -286,17 +259,18 @@ static void drop_lost(tactus_sim *sim)
 static int fill_block(tactus_sim *sim)
 {
 	sim_block *block = &sim->block;
-	const size_t step = sim->channel_count * sim->mode_count;
+	const size_t step = sim->plan.channel_count * sim->plan.mode_count;
 	int code = TACTUS_OK;
 	block->count = 0;
 	for (size_t i = 0; i < sim->block_scans && sim->next_scan < sim->scan_count; i++)
 		plan_scan(sim, sim->next_scan++, &block->count);
-	for (size_t i = 0; i < sim->channel_count && sim->loads == NULL && code >= 0; i++)
-		code = sim_sensor_run(&sim->sensors[i], block, i * sim->mode_count, sim->mode_count, step, sim->scratch);
+	for (size_t i = 0; i < sim->plan.channel_count && sim->loads == NULL && code >= 0; i++)
+		code =
+			sim_sensor_run(&sim->sensors[i], block, i * sim->plan.mode_count, sim->plan.mode_count, step, sim->scratch);
 	for (size_t i = 0; i < block->count; i++)
 		block->resistance_ohm[i] = block->conductance_S[i] > 0 ? 1 / block->conductance_S[i] : 0;
 	if (code >= 0)
-		code = sim_electronics_run(&sim->electronics, block, sim->channel_count, sim->mode_count);
+		code = sim_electronics_run(&sim->electronics, block, sim->plan.channel_count, sim->plan.mode_count);
 	drop_lost(sim);
 	sim->delivered = 0;
 	return code;
@@ -305,7 +279,7 @@ static int fill_block(tactus_sim *sim)
 static long sim_read(tactus_device *device, tactus_reading *readings, size_t max)
 {
 	tactus_sim *sim = device->state;
-	const size_t step = sim->channel_count * sim->mode_count;
+	const size_t step = sim->plan.channel_count * sim->plan.mode_count;
 	assert(step > 0);
 	while (sim->delivered == sim->block.count) {
 		if (sim->next_scan == sim->scan_count)

@@ -5,6 +5,7 @@
 #include "device/bench.h"
 #include "device/device.h"
 #include "device/loads.h"
+#include "device/plan.h"
 #include "device/protocol.h"
 
 /* What random numbers serve; each use has its own stream, for sensors one per channel. */
@@ -101,20 +102,13 @@ void sim_electronics_free(sim_electronics *electronics);
 double sim_window_s(const tactus_bench *bench, double frequency_Hz);
 /* From conductance and capacitance to detector volts, for readings in order; `position` counts channels in a scan. */
 int sim_electronics_run(sim_electronics *electronics, sim_block *block, size_t channel_count, size_t mode_count);
-/* Detectors, ADC and what is known of the circuit, as a recording says them. */
-int sim_electronics_metadata(const tactus_bench *bench, unsigned modes, tactus_metadata *metadata);
 
 /* ---- a scan: sim.c and sim_settings.c ---- */
-
-#define SIM_TICKS_PER_S 1e6 /* of the bench's timer, which starts scans and stamps readings */
 
 typedef struct {
 	tactus_bench *bench;
 	uint64_t seed;
-	const tactus_bench_sensor *scanned[TACTUS_BENCH_SENSORS_MAX]; /* in the order of the scan */
-	size_t channel_count, mode_count;
-	unsigned modes;
-	double drive_V, dc_drive_V, frequency_Hz, settle_s, rate_Hz, period_s; /* rate_Hz: as it was asked for */
+	tactus_plan plan;
 	uint64_t scan_count, next_scan;
 	tactus_protocol *protocol;
 	tactus_loads *loads;
