@@ -12,7 +12,7 @@
 #define PAUSE_FIRST_S 0.1 /* between attempts to find a lost device, doubled up to: */
 #define PAUSE_LAST_S 2
 
-static const tactus_backend *const backends[] = {&tactus_backend_sim, &tactus_backend_replay};
+static const tactus_backend *const backends[] = {&tactus_backend_sim, &tactus_backend_replay, &tactus_backend_usb};
 
 static int fail_unknown_scheme(const char *uri)
 {

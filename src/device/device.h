@@ -88,7 +88,7 @@ static inline tactus_reading tactus_reading_empty(void)
 /* Names the next further column. TACTUS_ERR_ARGUMENT if there are too many or the name is too long. */
 int tactus_device_add_extra(tactus_device *device, const char *name);
 
-extern const tactus_backend tactus_backend_sim, tactus_backend_replay;
+extern const tactus_backend tactus_backend_sim, tactus_backend_replay, tactus_backend_usb;
 
 /* Paces a simulation by the clock: waits until `time_s` after the first call with this state (zero before it). */
 typedef struct {
