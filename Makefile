@@ -31,7 +31,7 @@ ifneq ($(WERROR),)
 WARN += -Werror
 endif
 SANITIZE ?=
-PACKAGES := jansson tomlplusplus hidapi-hidraw libusb-1.0 libmodbus libserialport
+PACKAGES := jansson tomlplusplus hidapi-hidraw libusb-1.0 libmodbus libserialport libcurl
 PKG_CFLAGS := $(shell pkg-config --cflags $(PACKAGES) eigen3 2>/dev/null)
 PKG_LIBS := $(strip $(shell pkg-config --libs $(PACKAGES) 2>/dev/null))
 

@@ -12,7 +12,13 @@
 #define PAUSE_FIRST_S 0.1 /* between attempts to find a lost device, doubled up to: */
 #define PAUSE_LAST_S 2
 
-static const tactus_backend *const backends[] = {&tactus_backend_sim, &tactus_backend_replay, &tactus_backend_usb};
+static const tactus_backend *const backends[] = {
+	&tactus_backend_sim,    /* simulated benches */
+	&tactus_backend_replay, /* recordings */
+	&tactus_backend_serial, /* lines of text */
+	&tactus_backend_usb,    /* Measurement Computing */
+	&tactus_backend_udp,    /* ATI Net F/T */
+};
 
 static int fail_unknown_scheme(const char *uri)
 {
@@ -84,22 +90,20 @@ static int clear(tactus_device *device)
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	tactus_metadata_free(device->metadata);
 	device->metadata = metadata;
-	device->timing = (tactus_timing){0};
+	device->timing = device->intervals = (tactus_timing){0};
 	device->extras[0][0] = '\0';
 	device->lost_ns = 0;
 	return TACTUS_OK;
 }
 
-/* What is given by a request was true half a round trip before the answer came. */
+/* What is given on request was true half a round trip before the answer came, and is stamped so. */
 static int say_timing(tactus_device *device)
 {
-	int code = TACTUS_OK;
-	if (device->timing.n > 0) {
-		code = tactus_metadata_set_number(device->metadata, "device_delay_s", device->timing.mean_s / 2);
-		code = code < 0 ? code
-						: tactus_metadata_set_number(device->metadata, "device_jitter_s",
-													 tactus_timing_std_s(&device->timing));
-	}
+	const bool asked = device->timing.n > 0;
+	int code = tactus_metadata_set_number(device->metadata, "device_delay_s", asked ? device->timing.mean_s / 2 : NAN);
+	code = code < 0 ? code
+					: tactus_metadata_set_number(device->metadata, "device_jitter_s",
+												 tactus_timing_std_s(asked ? &device->timing : &device->intervals));
 	return code < 0 || device->reference == NULL ? code : tactus_reference_say(device->reference, device->metadata);
 }
 

@@ -59,7 +59,8 @@ struct tactus_device {
 	bool has_channels;
 	char extras[TACTUS_EXTRAS_MAX][TACTUS_EXTRA_SIZE]; /* names of further columns; "" past the last */
 	tactus_live live;                                  /* of a device that runs by the clock */
-	tactus_timing timing; /* round trips of requests, measured by start; left empty by what sends on its own */
+	tactus_timing timing;    /* round trips of requests, measured by start; left empty by what sends on its own */
+	tactus_timing intervals; /* between samples of a device that sends on its own, measured by start */
 	tactus_faults faults;
 	struct tactus_reference *reference; /* reference.h; NULL: none */
 	atomic_bool cancelled;              /* another thread wants tactus_device_recover() to give up */
@@ -88,7 +89,11 @@ static inline tactus_reading tactus_reading_empty(void)
 /* Names the next further column. TACTUS_ERR_ARGUMENT if there are too many or the name is too long. */
 int tactus_device_add_extra(tactus_device *device, const char *name);
 
-extern const tactus_backend tactus_backend_sim, tactus_backend_replay, tactus_backend_usb;
+extern const tactus_backend tactus_backend_sim;
+extern const tactus_backend tactus_backend_replay;
+extern const tactus_backend tactus_backend_serial;
+extern const tactus_backend tactus_backend_usb;
+extern const tactus_backend tactus_backend_udp;
 
 /* Paces a simulation by the clock: waits until `time_s` after the first call with this state (zero before it). */
 typedef struct {

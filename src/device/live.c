@@ -1,6 +1,7 @@
 /* The clock of devices that are real. */
 #include <errno.h>
 #include <math.h>
+#include <poll.h>
 #include <time.h>
 
 #include "core/core.h"
@@ -19,6 +20,18 @@ int tactus_clock_wait(int64_t until_ns)
 	if (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL) == EINTR)
 		return tactus_fail(TACTUS_ERR_INTERRUPTED, "interrupted while waiting for a device");
 	return TACTUS_OK;
+}
+
+int tactus_clock_wait_readable(int fd, int64_t until_ns)
+{
+	struct pollfd wanted = {.fd = fd, .events = POLLIN};
+	const int64_t left_ns = until_ns - tactus_clock_ns();
+	const struct timespec left = {.tv_sec = (time_t)(left_ns > 0 ? left_ns / 1000000000 : 0),
+								  .tv_nsec = (long)(left_ns > 0 ? left_ns % 1000000000 : 0)};
+	const int n = ppoll(&wanted, 1, &left, NULL);
+	if (n < 0 && errno == EINTR)
+		return tactus_fail(TACTUS_ERR_INTERRUPTED, "interrupted while waiting for a device");
+	return n != 0; /* what is wrong with the descriptor, a read will say */
 }
 
 void tactus_live_begin(tactus_live *live, double rate_Hz, const tactus_scan_settings *settings)
@@ -42,7 +55,7 @@ uint64_t tactus_live_expected(double rate_Hz, const tactus_scan_settings *settin
 
 double tactus_live_at_s(const tactus_live *live, int64_t clock_ns)
 {
-	return 1e-9 * (double)(clock_ns - live->origin_ns);
+	return (double)((clock_ns - live->origin_ns) / 1000) / 1e6; /* microseconds: what is left out is noise */
 }
 
 double tactus_live_now_s(const tactus_live *live)

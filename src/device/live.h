@@ -12,6 +12,9 @@ int64_t tactus_clock_ns(void);
 /* Waits until that instant; TACTUS_ERR_INTERRUPTED if a signal came. */
 int tactus_clock_wait(int64_t until_ns);
 
+/* The same, or until there is something to read: 1 if there is (or an end, or an error), 0 if not. */
+int tactus_clock_wait_readable(int fd, int64_t until_ns);
+
 /* A running scan: scan k is due at origin + k periods, whatever happened to those before it. */
 typedef struct {
 	int64_t origin_ns;

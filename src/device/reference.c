@@ -161,10 +161,10 @@ static int wait_first(struct tactus_reference *r)
 	pthread_mutex_lock(&r->mutex);
 	while (r->count < FIRST_SAMPLES && r->error >= 0 && tactus_clock_ns() < until_ns)
 		wait_until(r, until_ns);
-	const bool none = r->count == 0;
+	const uint64_t count = r->count;
 	pthread_mutex_unlock(&r->mutex);
-	const int code = tactus_reference_error(r);
-	if (code >= 0 && none)
+	const int code = count >= FIRST_SAMPLES ? TACTUS_OK : tactus_reference_error(r);
+	if (code >= 0 && count == 0)
 		return tactus_fail(TACTUS_ERR_DEVICE, "reference: no sample came within %d s", FIRST_PATIENCE_S);
 	return code;
 }
@@ -234,13 +234,14 @@ static double force_at(const struct tactus_reference *r, int64_t at_ns)
 {
 	const uint64_t oldest = r->count > SAMPLES ? r->count - SAMPLES : 0;
 	uint64_t i = r->count; /* of the first sample after the instant; readings are young: from the end */
-	while (i > oldest && r->samples[(i - 1) % SAMPLES].at_ns >= at_ns)
+	while (i > oldest && r->samples[(i - 1) % SAMPLES].at_ns > at_ns)
 		i--;
-	if (i == oldest || i == r->count)
+	if (i == oldest)
 		return NAN;
 	const sample *a = &r->samples[(i - 1) % SAMPLES], *b = &r->samples[i % SAMPLES];
-	const double interval_s = 1e-9 * (double)(b->at_ns - a->at_ns);
-	if (interval_s > GAP * r->intervals.mean_s)
+	if (a->at_ns == at_ns)
+		return a->force_N;
+	if (i == r->count || 1e-9 * (double)(b->at_ns - a->at_ns) > GAP * r->intervals.mean_s)
 		return NAN;
 	return a->force_N + (b->force_N - a->force_N) * (double)(at_ns - a->at_ns) / (double)(b->at_ns - a->at_ns);
 }
