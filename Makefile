@@ -17,6 +17,8 @@ INCLUDEDIR ?= $(PREFIX)/include
 DATADIR ?= $(PREFIX)/share
 MANDIR ?= $(DATADIR)/man
 COMPLETIONDIR ?= $(DATADIR)/bash-completion/completions
+# One of the places where udev looks, whatever LIBDIR is.
+UDEVDIR ?= $(PREFIX)/lib/udev/rules.d
 
 ifeq ($(origin CC),default)
 CC := gcc
@@ -57,6 +59,7 @@ UNIT_C := $(wildcard tests/unit/test_*.c)
 UNIT := $(UNIT_C:tests/unit/%.c=$(BUILD)/tests/%)
 HEADERS := $(wildcard include/tactus/*.h)
 PROFILES := $(wildcard src/device/*/*.toml)
+RULES := src/device/60-tactus.rules
 
 PROGRAM := $(BUILD)/tactus
 SHARED := $(BUILD)/libtactus.so
@@ -295,7 +298,7 @@ fuzz: $(PROGRAM) ## fuzz recordings, models, protocols and the diagnosis for FUZ
 fuzzers: $(FUZZ)
 
 $(BUILD)/fuzz_%: tests/fuzz/fuzz_%.c $(STATIC)
-	$(call say,FUZZ)$(CC) $(CPPFLAGS_ALL) $(CFLAGS_ALL) -fsanitize=fuzzer -fsanitize-link-c++-runtime $(DEPFLAGS) -MF $@.d $< -o $@ $(STATIC) \
+	$(call say,FUZZ)$(CC) $(CPPFLAGS_ALL) $(LIB_CFLAGS) $(CFLAGS_ALL) -fsanitize=fuzzer -fsanitize-link-c++-runtime $(DEPFLAGS) -MF $@.d $< -o $@ $(STATIC) \
 		$(LDFLAGS) $(LDLIBS_PRIVATE)
 
 .PHONY: coverage
@@ -337,7 +340,7 @@ $(COMPLETION): $(PROGRAM)
 # The installed program looks for the library where it was installed, relative to itself.
 .PHONY: install
 install: all docs ## install to PREFIX (default /usr/local), under DESTDIR if that is set
-	@install -d $(addprefix $(DESTDIR),$(BINDIR) $(LIBDIR)/pkgconfig $(INCLUDEDIR)/tactus $(DATADIR)/tactus $(MANDIR) $(COMPLETIONDIR))
+	@install -d $(addprefix $(DESTDIR),$(BINDIR) $(LIBDIR)/pkgconfig $(INCLUDEDIR)/tactus $(DATADIR)/tactus $(MANDIR) $(COMPLETIONDIR) $(UDEVDIR))
 	@$(LINK_PROGRAM) -Wl,-rpath,'$$ORIGIN/$(shell realpath -m --relative-to=$(BINDIR) $(LIBDIR))' -o $(DESTDIR)$(BINDIR)/tactus
 	@install -m 644 $(BUILD)/$(SONAME) $(DESTDIR)$(LIBDIR)/libtactus.so.$(VERSION)
 	@ln -sf libtactus.so.$(VERSION) $(DESTDIR)$(LIBDIR)/$(SONAME)
@@ -348,10 +351,12 @@ install: all docs ## install to PREFIX (default /usr/local), under DESTDIR if th
 	@$(if $(PROFILES),install -m 644 $(PROFILES) $(DESTDIR)$(DATADIR)/tactus/)
 	@for page in $(MAN); do install -D -m 644 -t $(DESTDIR)$(MANDIR)/man$${page##*.} $$page; done
 	@install -m 644 $(COMPLETION) $(DESTDIR)$(COMPLETIONDIR)/
+	@install -m 644 $(RULES) $(DESTDIR)$(UDEVDIR)/
 
 .PHONY: uninstall
 uninstall: all docs ## remove what install put there, and nothing else
 	@rm -f $(addprefix $(DESTDIR),$(BINDIR)/tactus $(COMPLETIONDIR)/tactus $(LIBDIR)/pkgconfig/tactus.pc \
+		$(UDEVDIR)/$(notdir $(RULES)) \
 		$(addprefix $(LIBDIR)/,libtactus.so.$(VERSION) $(SONAME) libtactus.so libtactus.a) \
 		$(HEADERS:include/%=$(INCLUDEDIR)/%) $(addprefix $(DATADIR)/tactus/,$(notdir $(PROFILES))))
 	@for page in $(MAN); do rm -f $(DESTDIR)$(MANDIR)/man$${page##*.}/$${page##*/}; done

@@ -26,7 +26,8 @@ enum tactus_quality {
 	TACTUS_QUALITY_SATURATED = 1 << 7,       /**< "saturated": no load gives this reading */
 	TACTUS_QUALITY_NOISE_AMPLIFIED = 1 << 8, /**< "noise-amplified": undoing a lag multiplies the noise */
 	TACTUS_QUALITY_UNCALIBRATED = 1 << 9,    /**< "uncalibrated": the model file has no such channel */
-	TACTUS_QUALITY_APPROXIMATE = 1 << 10     /**< "approximate": the neighbours' loads are of another instant */
+	TACTUS_QUALITY_APPROXIMATE =
+		1 << 10 /**< "approximate": the neighbours' loads are of another instant; a scale still moves */
 };
 enum { TACTUS_QUALITY_SIZE = 128 };
 

@@ -17,6 +17,7 @@ static const tactus_backend *const backends[] = {
 	&tactus_backend_replay, /* recordings */
 	&tactus_backend_serial, /* lines of text */
 	&tactus_backend_usb,    /* Measurement Computing */
+	&tactus_backend_hid,    /* USB scales */
 	&tactus_backend_udp,    /* ATI Net F/T */
 };
 

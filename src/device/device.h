@@ -93,6 +93,7 @@ extern const tactus_backend tactus_backend_sim;
 extern const tactus_backend tactus_backend_replay;
 extern const tactus_backend tactus_backend_serial;
 extern const tactus_backend tactus_backend_usb;
+extern const tactus_backend tactus_backend_hid;
 extern const tactus_backend tactus_backend_udp;
 
 /* Paces a simulation by the clock: waits until `time_s` after the first call with this state (zero before it). */
