@@ -75,7 +75,7 @@ enum { SIM_AMPLITUDE, SIM_PHASE, SIM_DC, SIM_FILTERS };
 typedef struct {
 	double settle[SIM_FILTERS]; /* share of the old value that is left in the mean over the converter's window */
 	double end[SIM_FILTERS];    /* and at its end */
-	double frequency_Hz;
+	double frequency_Hz, settle_s;
 } sim_settling;
 
 typedef struct {
@@ -102,6 +102,16 @@ void sim_electronics_free(sim_electronics *electronics);
 double sim_window_s(const tactus_bench *bench, double frequency_Hz);
 /* From conductance and capacitance to detector volts, for readings in order; `position` counts channels in a scan. */
 int sim_electronics_run(sim_electronics *electronics, sim_block *block, size_t channel_count, size_t mode_count);
+/*
+ * Outside a scan: the one reading of the block, of that one of the sensors that it was started with, settle_s after it
+ * was selected or after the window before. Volts before the converter, means over its window that is centred at the
+ * reading's time.
+ */
+#define SIM_NO_SENSOR SIZE_MAX /* all switches are open */
+int sim_electronics_sense(sim_electronics *electronics, sim_block *block, size_t sensor, double settle_s,
+						  double mean_V[SIM_FILTERS]);
+/* With the bench's noise, as a code of its converter gives it; says so if it is the first or the last code. */
+double sim_electronics_convert(sim_electronics *electronics, double volts_V, unsigned *quality);
 
 /* ---- a scan: sim.c and sim_settings.c ---- */
 

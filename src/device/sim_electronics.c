@@ -118,14 +118,15 @@ static void set_channel(sim_electronics *e, size_t channel)
 		tactus_chain_set(e->chain, (long)k, parameters + k * TACTUS_PARAMETERS_MAX);
 }
 
-/* Amplitude and phase at the amplifier's output, of a block at once if all channels are alike. */
-static int run_chain(sim_electronics *e, sim_block *block, size_t channel_count, size_t mode_count)
+/* Amplitude and phase at the amplifier's output, of a block at once if all channels are alike; `first`: its first one.
+ */
+static int run_chain(sim_electronics *e, sim_block *block, size_t first, size_t channel_count, size_t mode_count)
 {
 	int code = TACTUS_OK;
 	const size_t step = e->parameters != NULL ? mode_count : block->count;
 	for (size_t i = 0; i < block->count && code >= 0; i += step) {
 		if (e->parameters != NULL)
-			set_channel(e, i / mode_count % channel_count);
+			set_channel(e, (first + i / mode_count) % channel_count);
 		double *signal[READOUT_SIGNALS] = {
 			[READOUT_TIME] = block->time_s + i,
 			[READOUT_RESISTANCE] = block->resistance_ohm + i,
@@ -167,10 +168,11 @@ static double left(double time_s, double tau_s)
 static const sim_settling *settling(sim_electronics *e, double frequency_Hz)
 {
 	sim_settling *s = &e->settling[frequency_Hz > 0];
-	if (s->frequency_Hz == frequency_Hz)
+	if (s->frequency_Hz == frequency_Hz && s->settle_s == e->settle_s)
 		return s;
 	const double window_s = sim_window_s(e->bench, frequency_Hz);
 	s->frequency_Hz = frequency_Hz;
+	s->settle_s = e->settle_s;
 	for (int f = 0; f < SIM_FILTERS; f++) {
 		const double tau_s = filter_s(e->bench, f), settled = left(e->settle_s, tau_s);
 		s->settle[f] = tau_s > 0 ? settled * -expm1(-window_s / tau_s) * tau_s / window_s : 0;
@@ -254,7 +256,7 @@ static void settle(sim_electronics *e, const tactus_reading *reading, const doub
 
 /* ---- converter ---- */
 
-static double convert(sim_electronics *e, double volts_V, unsigned *quality)
+double sim_electronics_convert(sim_electronics *e, double volts_V, unsigned *quality)
 {
 	const tactus_bench *bench = e->bench;
 	const double step_V = tactus_bench_step_V(bench), top = exp2(bench->adc.bits) - 1;
@@ -265,27 +267,46 @@ static double convert(sim_electronics *e, double volts_V, unsigned *quality)
 	return bench->adc.minimum_V + fmax(0, fmin(top, code)) * step_V;
 }
 
+/* What the filters show of one reading of the block, averaged over the converter's window. */
+static void detect(sim_electronics *e, const sim_block *block, size_t i, double mean_V[SIM_FILTERS])
+{
+	tactus_reading *reading = &block->readings[i];
+	const bool ac = reading->mode == TACTUS_MODE_AC;
+	double target_V[SIM_FILTERS];
+	find_targets(e->bench, block->amplitude_V[i], block->phase_rad[i], ac, target_V);
+	settle(e, reading, target_V, mean_V);
+	if (fabs(block->amplitude_V[i]) > e->bench->amplifier.maximum_V)
+		reading->quality |= TACTUS_QUALITY_CLIPPED;
+	e->current_A = block->amplitude_V[i] / e->bench->amplifier.gain_resistor_ohm;
+	e->current_phase_rad = ac ? block->phase_rad[i] : 0;
+	e->current_Hz = reading->frequency_Hz;
+}
+
 int sim_electronics_run(sim_electronics *e, sim_block *block, size_t channel_count, size_t mode_count)
 {
-	const double rg_ohm = e->bench->amplifier.gain_resistor_ohm;
-	const int code = run_chain(e, block, channel_count, mode_count);
+	const int code = run_chain(e, block, 0, channel_count, mode_count);
 	for (size_t i = 0; i < block->count && code >= 0; i++) {
 		tactus_reading *reading = &block->readings[i];
-		const bool ac = reading->mode == TACTUS_MODE_AC;
-		double target_V[SIM_FILTERS], mean_V[SIM_FILTERS];
-		find_targets(e->bench, block->amplitude_V[i], block->phase_rad[i], ac, target_V);
-		settle(e, reading, target_V, mean_V);
-		if (fabs(block->amplitude_V[i]) > e->bench->amplifier.maximum_V)
-			reading->quality |= TACTUS_QUALITY_CLIPPED;
-		if (ac) {
-			reading->detector_amplitude_V = convert(e, mean_V[SIM_AMPLITUDE], &reading->quality);
-			reading->detector_phase_V = convert(e, mean_V[SIM_PHASE], &reading->quality);
+		double mean_V[SIM_FILTERS];
+		detect(e, block, i, mean_V);
+		if (reading->mode == TACTUS_MODE_AC) {
+			reading->detector_amplitude_V = sim_electronics_convert(e, mean_V[SIM_AMPLITUDE], &reading->quality);
+			reading->detector_phase_V = sim_electronics_convert(e, mean_V[SIM_PHASE], &reading->quality);
 		} else {
-			reading->detector_dc_V = convert(e, mean_V[SIM_DC], &reading->quality);
+			reading->detector_dc_V = sim_electronics_convert(e, mean_V[SIM_DC], &reading->quality);
 		}
-		e->current_A = block->amplitude_V[i] / rg_ohm;
-		e->current_phase_rad = ac ? block->phase_rad[i] : 0;
-		e->current_Hz = reading->frequency_Hz;
 	}
+	return code;
+}
+
+int sim_electronics_sense(sim_electronics *e, sim_block *block, size_t sensor, double settle_s,
+						  double mean_V[SIM_FILTERS])
+{
+	const int code = sensor != SIM_NO_SENSOR ? run_chain(e, block, sensor, SIZE_MAX, 1) : TACTUS_OK;
+	if (sensor == SIM_NO_SENSOR)
+		block->amplitude_V[0] = block->phase_rad[0] = 0;
+	e->settle_s = settle_s;
+	if (code >= 0)
+		detect(e, block, 0, mean_V);
 	return code;
 }
