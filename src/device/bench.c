@@ -173,6 +173,8 @@ static int read_head(const tactus_toml_node *root, tactus_bench *bench)
 		status = read_text(root, "start", &bench->start);
 	if (status >= 0)
 		status = read_text(root, "protocol", &bench->protocol);
+	if (status >= 0)
+		status = read_text(root, "driver", &bench->driver);
 	return status;
 }
 
@@ -307,6 +309,7 @@ void tactus_bench_free(tactus_bench *bench)
 	free(bench->description);
 	free(bench->start);
 	free(bench->protocol);
+	free(bench->driver);
 	free(bench);
 }
 

@@ -51,6 +51,7 @@ typedef struct {
 
 typedef struct {
 	char *name, *description, *start, *protocol;
+	char *driver; /* whose code reads the real bench; NULL: it is none */
 	double seed, lost_scans;
 	struct {
 		double rate_Hz, settle_s, drive_V, dc_drive_V, frequency_Hz;

@@ -30,8 +30,8 @@ struct tactus_instrument {
 static void make_block(tactus_instrument *t)
 {
 	sim_block *b = &t->block;
-	double **const fields[FIELDS] = {&b->time_s,         &b->force_N,      &b->temperature_degC, &b->conductance_S,
-									 &b->capacitance_F,  &b->drive_V,      &b->frequency_Hz,     &b->channel,
+	double **const fields[FIELDS] = {&b->time_s,         &b->force_N,     &b->temperature_degC, &b->conductance_S,
+									 &b->capacitance_F,  &b->drive_V,     &b->frequency_Hz,     &b->channel,
 									 &b->resistance_ohm, &b->amplitude_V, &b->phase_rad};
 	for (size_t i = 0; i < FIELDS; i++)
 		*fields[i] = &t->fields[i];
@@ -59,8 +59,8 @@ static int start(tactus_instrument *t, const char *protocol)
 	const tactus_bench_sensor *sensors[TACTUS_BENCH_SENSORS_MAX];
 	tactus_bench *bench = t->bench;
 	int code = check(bench);
-	code = code < 0 ? code
-					: tactus_protocol_parse(protocol != NULL ? protocol : bench->protocol, t->seed, &t->protocol);
+	code =
+		code < 0 ? code : tactus_protocol_parse(protocol != NULL ? protocol : bench->protocol, t->seed, &t->protocol);
 	code = code < 0 ? code : sim_press_start(&t->press, bench, t->protocol);
 	for (size_t i = 0; i < bench->sensor_count && code >= 0; i++) {
 		sensors[i] = &bench->sensors[i];
