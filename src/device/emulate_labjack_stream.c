@@ -225,7 +225,7 @@ static void put_gap(emulated_stream *s)
 static void run_scan(emulated_labjack *lj)
 {
 	emulated_stream *s = &lj->stream;
-	uint16_t samples[LABJACK_STREAM_LIST_MAX];
+	uint16_t samples[LABJACK_STREAM_LIST_MAX] = {0};
 	const int64_t at_ns = s->start_ns + (int64_t)llround(1e9 * (double)(s->next + 1) / s->rate_Hz);
 	take(lj, tactus_emulation_s(lj->world, at_ns), samples);
 	const bool lost = is_lost(lj), stops = lost && u32(lj, LABJACK_STREAM_NO_RECOVERY) != 0;

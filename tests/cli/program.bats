@@ -2,8 +2,8 @@
 # The program itself: help, version, unknown words, man pages, completion.
 load common
 
-@test "the nine commands are listed" {
-	[ "$(commands | tr '\n' ' ')" = "devices scan convert fit force simulate diagnose show join " ]
+@test "the ten commands are listed" {
+	[ "$(commands | tr '\n' ' ')" = "devices scan convert fit force simulate diagnose show join emulate " ]
 }
 
 @test "--version prints the version of the header" {
