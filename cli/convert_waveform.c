@@ -270,7 +270,8 @@ static int run_csv(struct waveform *w, tactus_reader *reader, struct samples *s)
 	if (status)
 		return cli_fail(w->cli, status);
 	if (tactus_table_find(tactus_reader_block(reader), column_names[SAMPLE]) < 0)
-		return cli_error(w->cli, CLI_INPUT, "%s: no column sample_V (--columns sample_V=… names another)", w->name);
+		return cli_error(w->cli, CLI_INPUT, "%s:%zu: no column sample_V (--columns sample_V=… names another)", w->name,
+						 tactus_table_header_line(tactus_reader_block(reader)));
 	while (!status && rows > 0 && !cli_signal) {
 		tactus_table *block;
 		rows = tactus_reader_next(reader, 0, &block);

@@ -64,6 +64,8 @@ TACTUS_API const double *tactus_table_numbers(const tactus_table *table, const c
 TACTUS_API const tactus_text *tactus_table_texts(const tactus_table *table, const char *name);
 /** The line of the file that a row came from (1 is the first), 0 if it came from none. */
 TACTUS_API size_t tactus_table_line(const tactus_table *table, size_t row);
+/** The line of the file that names the columns (in JSON Lines the first record's), 0 if the table came from none. */
+TACTUS_API size_t tactus_table_header_line(const tactus_table *table);
 /** The file's name as it is printed in errors; "" if the table came from none. */
 TACTUS_API const char *tactus_table_file(const tactus_table *table);
 /** The metadata, owned by the table, never NULL. */

@@ -140,6 +140,9 @@ static int fail_number(const struct tactus_reader *reader, tactus_text text, siz
 {
 	static const char *const literals[] = {"nan", "inf", "infinity"};
 	const char *column = reader->layout.names[field];
+	if (text.length == strlen(column) && memcmp(text.text, column, text.length) == 0)
+		return tactus_input_fail(
+			&reader->input, "the header is here again ('%s'); two recordings in one file? then split it here", column);
 	const char *word = text.text + (text.length > 0 && (*text.text == '-' || *text.text == '+'));
 	size_t length = text.length - (size_t)(word - text.text);
 	int cut = tactus_cut(text.text, text.length);
@@ -393,6 +396,7 @@ int tactus_csv_open(struct tactus_reader *reader)
 	}
 	const char *line = input->buffer + input->begin;
 	int error = read_header(reader, line);
+	reader->table->header_line = input->line;
 	if (!error)
 		next_line(input, (const char *)rawmemchr(line, '\n') + 1);
 	return error ? error : make_arrays(reader);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/core.h"
+#include "core/table.h"
 
 /* Columns that may follow the force, best first, and how they do. */
 static const struct {
@@ -195,8 +196,7 @@ static int find_offset(const tactus_table *scan, const tactus_track *reference, 
 	int sign;
 	const char *column = find_reading(scan, options->reading, &sign);
 	if (!column || !tactus_table_numbers(scan, column))
-		return tactus_fail(TACTUS_ERR_INPUT, "%s: no column %s to compare with the reference", tactus_table_file(scan),
-						   column ? column : "of readings");
+		return tactus_table_fail(scan, "no column %s to compare with the reference", column ? column : "of readings");
 	struct tracks tracks = {0};
 	int error = read_tracks(scan, column, sign, &tracks);
 	if (!error)
@@ -255,8 +255,7 @@ static int check_columns(const tactus_table *scan, const tactus_table *reference
 	} needed[] = {{scan, "time_s"}, {reference, "time_s"}, {reference, force}};
 	for (size_t i = 0; i < TACTUS_COUNT(needed); i++)
 		if (!tactus_table_numbers(needed[i].table, needed[i].column))
-			return tactus_fail(TACTUS_ERR_INPUT, "%s: no column %s", tactus_table_file(needed[i].table),
-							   needed[i].column);
+			return tactus_table_fail(needed[i].table, "no column %s", needed[i].column);
 	return TACTUS_OK;
 }
 

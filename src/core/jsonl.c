@@ -94,6 +94,7 @@ static int make_columns(struct tactus_reader *reader, json_t *record)
 	if (!ok)
 		tactus_fail(TACTUS_ERR_MEMORY, "memory ran out");
 	reader->layout.names = names; /* freed with the layout, whatever happens */
+	reader->table->header_line = reader->input.line;
 	reader->layout.fields = f;
 	return ok ? tactus_layout_make(&reader->layout, &reader->input, reader->options.columns, names, fields,
 								   reader->table)

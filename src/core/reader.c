@@ -190,6 +190,7 @@ static int begin_whole(tactus_table *whole, tactus_table *block)
 	whole->metadata = block->metadata;
 	block->metadata = metadata;
 	whole->file = block->file;
+	whole->header_line = block->header_line;
 	block->file = NULL;
 	whole->lines = malloc(sizeof *whole->lines);
 	bool ok = whole->lines != NULL;

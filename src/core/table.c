@@ -1,5 +1,7 @@
 /* Tables: columns of numbers and texts, with values that may still stand in the lines they were read from. */
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -82,6 +84,23 @@ enum tactus_column_type tactus_table_type(const tactus_table *table, size_t colu
 size_t tactus_table_line(const tactus_table *table, size_t row)
 {
 	return table->lines && row < table->rows ? table->lines[row] : 0;
+}
+
+size_t tactus_table_header_line(const tactus_table *table)
+{
+	return table->header_line;
+}
+
+int tactus_table_fail(const tactus_table *table, const char *format, ...)
+{
+	char text[512];
+	va_list arguments;
+	va_start(arguments, format);
+	vsnprintf(text, sizeof text, format, arguments);
+	va_end(arguments);
+	if (!table->header_line)
+		return tactus_fail(TACTUS_ERR_INPUT, "%s%s%s", tactus_table_file(table), table->file ? ": " : "", text);
+	return tactus_fail(TACTUS_ERR_INPUT, "%s:%zu: %s", tactus_table_file(table), table->header_line, text);
 }
 
 const char *tactus_table_file(const tactus_table *table)

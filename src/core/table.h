@@ -41,7 +41,8 @@ struct tactus_table {
 	size_t rows, capacity; /* capacity: of the arrays of every column, and of lines and offsets */
 	tactus_metadata *metadata;
 	char *file;
-	size_t *lines; /* line number of every row, or NULL */
+	size_t *lines;      /* line number of every row, or NULL */
+	size_t header_line; /* of the line that names the columns, 0: none */
 	/*
 	 * The lines of a block: field f of row r is text[offsets[r·stride + f] … offsets[r·stride + f + 1] − 1), the last
 	 * field's end is followed by one byte as well. stride is the number of fields + 1.
@@ -54,6 +55,8 @@ struct tactus_table {
 	struct tactus_arena *arena;
 };
 
+/* TACTUS_ERR_INPUT about the columns as a whole: the message begins with the file and the line that names them. */
+int tactus_table_fail(const tactus_table *table, const char *format, ...) TACTUS_PRINTF(2, 3);
 /* The kind that a column's name tells: number, text or unknown. */
 enum tactus_column_kind tactus_kind_of_name(const char *name);
 /* Adds a column of that kind at the end (the name must be new); NULL when memory runs out. */

@@ -9,6 +9,7 @@
 
 #include "core/core.h"
 #include "core/random.h"
+#include "core/table.h"
 #include "core/toml.h"
 #include "device/bench.h"
 #include "device/loads.h"
@@ -117,9 +118,7 @@ static int fill_from_table(const tactus_table *table, tactus_loads *loads)
 	const double *resistance = tactus_table_numbers(table, "reference_resistance_ohm");
 	const double *capacitance = tactus_table_numbers(table, "reference_capacitance_F");
 	if (resistance == NULL && capacitance == NULL)
-		return tactus_fail(TACTUS_ERR_INPUT,
-						   "%s: loads are columns reference_resistance_ohm and reference_capacitance_F",
-						   tactus_table_file(table));
+		return tactus_table_fail(table, "loads are columns reference_resistance_ohm and reference_capacitance_F");
 	loads->passes = 1;
 	loads->loads = calloc(rows, sizeof(*loads->loads));
 	if (loads->loads == NULL)

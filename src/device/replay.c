@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/core.h"
+#include "core/table.h"
 #include "device/device.h"
 
 typedef struct {
@@ -87,15 +88,13 @@ static int find_columns(tactus_device *device, const tactus_table *block)
 	const bool readings = tactus_table_numbers(block, "amplitude_V") != NULL;
 	tactus_detectors detectors;
 	if (!raw_ac && !raw_dc && !readings)
-		return tactus_fail(TACTUS_ERR_INPUT, "%s: neither amplitude_V nor detector volts: nothing to play",
-						   tactus_table_file(block));
+		return tactus_table_fail(block, "neither amplitude_V nor detector volts: nothing to play");
 	const int code = tactus_detectors_get(device->metadata, &detectors);
 	if (code < 0)
 		return code;
 	device->has_detectors = code > 0 && (raw_ac || raw_dc);
 	if (!device->has_detectors && !readings)
-		return tactus_fail(TACTUS_ERR_INPUT, "%s: detector volts without the detectors' scale in the metadata",
-						   tactus_table_file(block));
+		return tactus_table_fail(block, "detector volts without the detectors' scale in the metadata");
 	device->modes = modes == NULL ? TACTUS_MODE_DC | TACTUS_MODE_AC
 								  : (strstr(modes, "dc") != NULL ? TACTUS_MODE_DC : 0u) |
 										(strstr(modes, "ac") != NULL ? TACTUS_MODE_AC : 0u);

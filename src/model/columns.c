@@ -109,7 +109,11 @@ const char *tactus_columns_where(const tactus_columns *columns)
 {
 	static _Thread_local char text[NAME_SIZE];
 	const char *file = tactus_table_file(columns->table);
-	snprintf(text, sizeof text, *file != '\0' ? "%s: " : "%s", file);
+	size_t line = tactus_table_header_line(columns->table);
+	if (line)
+		snprintf(text, sizeof text, "%s:%zu: ", file, line);
+	else
+		snprintf(text, sizeof text, *file != '\0' ? "%s: " : "%s", file);
 	return text;
 }
 

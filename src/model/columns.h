@@ -36,7 +36,8 @@ int tactus_columns_bind(const tactus_table *table, const tactus_series_options *
 int tactus_columns_of_model(const tactus_table *recording, const tactus_model *model, tactus_series_options *options);
 /* TACTUS_ERR_INPUT: says that a column is missing, and what to do about it. */
 int tactus_columns_fail_missing(const tactus_columns *columns, const char *name);
-/* "FILE: ", or "" when the table came from none: what a message begins with. Valid until the next call. */
+/* "FILE:LINE: " (the header's), "FILE: ", or "" when the table came from none: what a message begins with. Valid until
+ * the next call. */
 const char *tactus_columns_where(const tactus_columns *columns);
 /* The channel of a row; TACTUS_ERR_INPUT with FILE:LINE if it is not a whole number. */
 int tactus_columns_channel(const tactus_columns *columns, size_t row, int *channel);

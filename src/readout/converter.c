@@ -6,6 +6,7 @@
 #include <tactus/error.h>
 
 #include "core/core.h"
+#include "core/table.h"
 #include "readout/impedance.h"
 
 enum { BLOCK = TACTUS_IMPEDANCE_BLOCK };
@@ -161,16 +162,14 @@ static int settle_detectors(struct tactus_converter *converter, const tactus_tab
 		if (tactus_table_find(block, volts[i]) < 0)
 			continue;
 		if (isnan(*scales[i]) && !amplitude)
-			return tactus_fail(TACTUS_ERR_INPUT,
-							   "%s: column %s, but the metadata do not say its scale (detector_amplitude_gain, "
-							   "detector_phase_supply_V and detector_phase_inverted, detector_dc_gain)",
-							   tactus_table_file(block), volts[i]);
+			return tactus_table_fail(block,
+									 "column %s, but the metadata do not say its scale (detector_amplitude_gain, "
+									 "detector_phase_supply_V and detector_phase_inverted, detector_dc_gain)",
+									 volts[i]);
 		converter->raw |= !isnan(*scales[i]);
 	}
 	if (!converter->raw && !amplitude)
-		return tactus_fail(TACTUS_ERR_INPUT,
-						   "%s: no column amplitude_V, nor the detectors' volts (detector_amplitude_V, …)",
-						   tactus_table_file(block));
+		return tactus_table_fail(block, "no column amplitude_V, nor the detectors' volts (detector_amplitude_V, …)");
 	return 0;
 }
 

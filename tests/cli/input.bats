@@ -104,18 +104,43 @@ bad() {
 	[ ${#stderr} -lt 1000 ]
 }
 
-@test "a column that is needed and not there is named" {
-	recording | cut -d, -f1-4,6- >lacking.csv
-	for c in fit force; do
+@test "the header in the middle of a file" {
+	recording >good.csv
+	{
+		recording 3
+		recording 3
+	} >two.csv
+	bad two.csv two.csv:8
+	says "the header is here again"
+}
+
+@test "a column that is needed and not there is named, with the header's line" {
+	{
+		echo "# a remark"
+		recording | cut -d, -f1-4,6-7
+	} >lacking.csv
+	for c in fit force diagnose; do
 		# shellcheck disable=SC2046
 		run --separate-stderr tactus "$c" $(needs "$c") lacking.csv
 		status_is 3
-		says conductance_S
+		says "lacking.csv:2: no column 'conductance_S'"
 	done
+	run --separate-stderr tactus convert -g 1kohm lacking.csv
+	status_is 3
+	says "lacking.csv:2: no column amplitude_V"
+	run --separate-stderr tactus convert -w csv -g 1kohm --drive 1V --frequency 4kHz lacking.csv
+	status_is 3
+	says "lacking.csv:2: no column sample_V"
+	run --separate-stderr tactus scan replay:lacking.csv
+	status_is 3
+	says "lacking.csv:2: neither amplitude_V"
+	run --separate-stderr tactus scan sim: --loads lacking.csv
+	status_is 3
+	says "lacking.csv:2: loads are columns"
 	recording | cut -d, -f1-3,5- >unloaded.csv
 	run --separate-stderr tactus simulate -m "$examples/model-forward.toml" unloaded.csv
 	status_is 3
-	says force_N
+	says "unloaded.csv:1: no column 'force_N'"
 }
 
 @test "a reading that goes bad half way: the message has the line, and -o leaves nothing" {

@@ -235,6 +235,7 @@ static void bad_lines_are_named(void **state)
 		 "bad.csv:4: ", "1 fields where the header names 2 columns; the last line is cut off"},
 		{"force_N,x\n1,2\n3\n5,6\n", "bad.csv:3: ", "1 fields where the header names 2"},
 		{"force_N,x\n1,2\n3,4,5\n", "bad.csv:3: ", "3 fields where the header names 2"},
+		{"x,force_N\n1,2\nx,force_N\n1,2\n", "bad.csv:3: ", "the header is here again ('force_N')"},
 		{"force_N,x\n1,5,2\n", "bad.csv:2: ", "--decimal-comma"},
 		{"force_N;x\n1;2\n1,5;2\n", "bad.csv:3: '1,5' in column 'force_N'", "--decimal-comma"},
 		{"x,force_N\n1,2\n1,two\n", "bad.csv:3: 'two' is not a number", "'force_N'"},
