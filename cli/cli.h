@@ -77,6 +77,13 @@ struct cli_command {
 	{                                                                                                                  \
 		"columns", 0, CLI_STRING, "NEW=OLD,...", NULL, "rename and scale columns: time_s=ms/1000,force_N=load*9.81"    \
 	}
+/* The same of a second input, where a command reads two of different make. */
+#define CLI_OPTIONS_READ_SCAN                                                                                          \
+	{"scan-delimiter", 0, CLI_LETTER, "CHAR", NULL, "the same as --delimiter, of SCAN"},                               \
+		{"scan-decimal-comma", 0, CLI_FLAG, NULL, NULL, "the same as --decimal-comma, of SCAN"},                       \
+	{                                                                                                                  \
+		"scan-columns", 0, CLI_STRING, "NEW=OLD,...", NULL, "the same as --columns, of SCAN"                           \
+	}
 #define CLI_OPTIONS_DOMAIN                                                                                             \
 	{"domain", 0, CLI_CHOICE, "NAME", "sensor|readout", "domain of the recording (default: told by its columns)"},     \
 		{"input", 0, CLI_STRING, "COLUMN", NULL, "column that plays the domain's input"},                              \
@@ -101,8 +108,10 @@ bool cli_verbose(const struct cli *cli);
  */
 int cli_channels(const struct cli *cli, const char *option, int **channels, size_t *count);
 
-/* Reading options of CLI_OPTIONS_READ, writer flags and format of CLI_OPTIONS_OUTPUT and CLI_OPTIONS_FORMAT. */
+/* Reading options of CLI_OPTIONS_READ and CLI_OPTIONS_READ_SCAN. */
 tactus_read_options cli_read_options(const struct cli *cli);
+tactus_read_options cli_read_options_scan(const struct cli *cli);
+/* Writer flags and format of CLI_OPTIONS_OUTPUT and CLI_OPTIONS_FORMAT. */
 int cli_open_writer(const struct cli *cli, tactus_writer **writer);
 
 /* Prints "tactus NAME: " and the message on standard error and returns the exit status that a tactus_error maps to. */

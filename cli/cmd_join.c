@@ -64,9 +64,9 @@ static int run(struct cli *cli)
 		return cli_error(cli, CLI_USAGE, "--offset states what --drift and --max-offset would help to estimate");
 	if (cli_quantity(cli, "max-offset", 0) < 0)
 		return cli_error(cli, CLI_USAGE, "--max-offset: below zero");
-	tactus_read_options options = cli_read_options(cli);
+	tactus_read_options options = cli_read_options(cli), scan_options = cli_read_options_scan(cli);
 	tactus_table *scan = NULL, *reference = NULL;
-	int error = tactus_table_read(scan_file, NULL, &scan);
+	int error = tactus_table_read(scan_file, &scan_options, &scan);
 	if (!error)
 		error = tactus_table_read(reference_file, &options, &reference);
 	int status = error ? cli_fail(cli, error) : join(cli, scan, reference);
@@ -83,6 +83,7 @@ static const struct cli_option options[] = {
 	{"input", 0, CLI_STRING, "COLUMN", NULL, "column of REFERENCE that is the load (default force_N)"},
 	{"output", 0, CLI_STRING, "COLUMN", NULL, "column of SCAN to compare it with (default: told by its columns)"},
 	CLI_OPTIONS_READ,
+	CLI_OPTIONS_READ_SCAN,
 	CLI_OPTIONS_OUTPUT,
 	CLI_OPTIONS_FORMAT,
 	{NULL, 0, CLI_FLAG, NULL, NULL, NULL},
@@ -100,9 +101,12 @@ const struct cli_command cli_join = {
 		"error and in the metadata (reference_offset_s, reference_offset_std_s). A sensor that creeps or lags shows "
 		"up as a part of the offset.\n\n"
 		"A load that repeats itself fits at several offsets, which is then said; --max-offset or --offset decides. "
-		"--delimiter, --decimal-comma and --columns are about REFERENCE.",
+		"--delimiter, --decimal-comma and --columns are about REFERENCE; the three that begin with --scan- do the same "
+		"for "
+		"a SCAN that another program has logged.",
 	.examples = "tactus join run.csv scale.csv -o joined.csv  # both have time_s, scale.csv has force_N\n"
-				"tactus join run.csv log.csv --columns time_s=ms/1000,force_N=grams*0.00980665\n",
+				"tactus join run.csv log.csv --columns time_s=ms/1000,force_N=grams*0.00980665\n"
+				"tactus join board.csv scale.csv --scan-columns time_s=ms/1000,conductance_S=A0/1.023e7\n",
 	.options = options,
 	.arguments_min = 1,
 	.arguments_max = 2,

@@ -340,14 +340,24 @@ int cli_channels(const struct cli *cli, const char *option, int **channels, size
 	return 0;
 }
 
-tactus_read_options cli_read_options(const struct cli *cli)
+static tactus_read_options format_options(const struct cli *cli, const char *const names[3])
 {
-	const char *delimiter = cli_string(cli, "delimiter", "");
+	const char *delimiter = cli_string(cli, names[0], "");
 	return (tactus_read_options){
 		.delimiter = !strcmp(delimiter, "tab") ? '\t' : delimiter[0],
-		.decimal_comma = cli_has(cli, "decimal-comma"),
-		.columns = cli_string(cli, "columns", NULL),
+		.decimal_comma = cli_has(cli, names[1]),
+		.columns = cli_string(cli, names[2], NULL),
 	};
+}
+
+tactus_read_options cli_read_options(const struct cli *cli)
+{
+	return format_options(cli, (const char *const[]){"delimiter", "decimal-comma", "columns"});
+}
+
+tactus_read_options cli_read_options_scan(const struct cli *cli)
+{
+	return format_options(cli, (const char *const[]){"scan-delimiter", "scan-decimal-comma", "scan-columns"});
 }
 
 int cli_open_writer(const struct cli *cli, tactus_writer **writer)

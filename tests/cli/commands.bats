@@ -285,6 +285,28 @@ mapped=(--decimal-comma --columns 'time_s=millis/1000,force_N=load_g*0.00980665'
 	EOP
 }
 
+@test "join --scan-columns, --scan-delimiter, --scan-decimal-comma: a scan of another program" {
+	presses 2.34
+	# The board's own log: milliseconds and counts, tabs between them and commas in them.
+	awk -F, 'NR == 1 { print "ms\tA0"; next } { printf "%.10g\t%.17g\n", 1000 * $1, $4 * 1e7 }' scan.csv | tr . , >board.csv
+	foreign=(--scan-delimiter tab --scan-decimal-comma --scan-columns 'time_s=ms/1000,conductance_S=A0/1e7')
+	run --separate-stderr tactus join board.csv scale.csv "${mapped[@]}" "${foreign[@]}"
+	status_is 0
+	says "offset 2.34"
+	column force_N <<<"$output" >foreign
+	tactus join scan.csv scale.csv "${mapped[@]}" --quiet | column force_N >ours
+	"$PYTHON" - <<-'EOP'
+		ours, foreign = ([l.strip() for l in open(f)] for f in ("ours", "foreign"))
+		assert len(ours) == len(foreign) == 1200
+		for a, b in zip(ours, foreign):
+		    assert (a == "") == (b == "") and (a == "" or abs(float(a) - float(b)) < 1e-6), (a, b)
+	EOP
+	# By default both are read as ours.
+	run --separate-stderr tactus join board.csv scale.csv "${mapped[@]}"
+	status_is 3
+	says "no column time_s"
+}
+
 @test "join --offset: taken as stated; --max-offset: what lies beyond is not found" {
 	presses 2.34
 	tactus join scan.csv scale.csv "${mapped[@]}" --offset 2.34s --quiet >joined.csv
@@ -330,7 +352,7 @@ mapped=(--decimal-comma --columns 'time_s=millis/1000,force_N=load_g*0.00980665'
 	cut -d, -f2- scan.csv >clockless.csv
 	run --separate-stderr tactus join clockless.csv flat.csv
 	status_is 3
-	says "clockless.csv: no column time_s"
+	says "clockless.csv:$(grep -n sequence clockless.csv | head -1 | cut -d: -f1): no column time_s"
 	for args in "--offset 1s --drift" "--offset 1s --max-offset 2s" "--max-offset -1s" "--offset 1N"; do
 		run --separate-stderr tactus join scan.csv flat.csv $args
 		status_is 2
