@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "cli.h"
+#include "show.h"
 
 /* A column of the printed table, and a key of the JSON. */
 struct figure {
@@ -69,14 +70,16 @@ static void print_number(FILE *out, double value)
 	fprintf(out, "%*s", WIDTH, text);
 }
 
-static void print_head(FILE *out, const char *first, int width, const struct figure *figures, size_t n)
+/* Errors of the load are in the unit of the column that plays it. */
+static void print_head(FILE *out, const char *first, int width, const struct figure *figures, size_t n,
+					   const char *load_unit)
 {
 	fprintf(out, "%-*s", width, first);
 	for (size_t i = 0; i < n; i++)
 		fprintf(out, "%*s", WIDTH, figures[i].head);
 	fprintf(out, "\n%-*s", width, "");
 	for (size_t i = 0; i < n; i++)
-		fprintf(out, "%*s", WIDTH, figures[i].unit);
+		fprintf(out, "%*s", WIDTH, strcmp(figures[i].unit, "N") == 0 ? load_unit : figures[i].unit);
 	fputc('\n', out);
 }
 
@@ -87,9 +90,14 @@ static void print_row(FILE *out, const struct figure *figures, size_t n, const t
 	fputc('\n', out);
 }
 
+static const char *load_unit(const tactus_fit_result *result)
+{
+	return cli_unit_of(tactus_model_input(tactus_fit_model(result)));
+}
+
 static void print_figures(FILE *out, const tactus_fit_result *result, const struct figure *figures, size_t n)
 {
-	print_head(out, "channel  points", 16, figures, n);
+	print_head(out, "channel  points", 16, figures, n, load_unit(result));
 	for (size_t c = 0; c < tactus_fit_channels(result); c++) {
 		const tactus_fit_channel *channel = tactus_fit_channel_at(result, c);
 		if (channel->problem)
@@ -168,11 +176,13 @@ static void note_channel(const struct cli *cli, const tactus_fit_channel *channe
 static void print_table(const struct cli *cli, FILE *out, const tactus_fit_result *result)
 {
 	if (in_newtons(result)) {
-		fputs("Error of the force in sample and, CV, on stretches of load that the fit has not seen. PER: how much "
-			  "smaller\n"
-			  "the mean squared error is than that of `conductance`; bound: the best PER of any linear combination of\n"
-			  "the two readings.\n\n",
-			  out);
+		const char *input = tactus_model_input(tactus_fit_model(result));
+		fprintf(
+			out,
+			"Error of %s in sample and, CV, on stretches of load that the fit has not seen. PER: how much smaller\n"
+			"the mean squared error is than that of `conductance`; bound: the best PER of any linear combination of\n"
+			"the two readings.\n\n",
+			strcmp(input, "force_N") == 0 ? "the force" : input);
 		print_figures(out, result, error_figures, COUNT(error_figures));
 		fputs("\nStatic figures in % of full scale:\n\n", out);
 		print_figures(out, result, static_figures, COUNT(static_figures));
@@ -247,6 +257,7 @@ static void json_result(struct cli_json *json, const char *key, const char *name
 {
 	cli_json_object(json, key);
 	cli_json_string(json, "model", name);
+	cli_json_string(json, "input", tactus_model_input(tactus_fit_model(result)));
 	cli_json_array(json, "channels");
 	for (size_t c = 0; c < tactus_fit_channels(result); c++)
 		json_channel(json, tactus_fit_channel_at(result, c), tactus_fit_model(result));
@@ -299,7 +310,7 @@ static void print_comparison(size_t n, const char *const *name, tactus_fit_resul
 	for (size_t c = 0; c < tactus_fit_channels(any); c++) {
 		char head[32];
 		snprintf(head, sizeof head, "channel %d", tactus_fit_channel_at(any, c)->channel);
-		print_head(stdout, head, 16, error_figures, COUNT(error_figures));
+		print_head(stdout, head, 16, error_figures, COUNT(error_figures), load_unit(any));
 		for (size_t m = 0; m < n; m++) {
 			const tactus_fit_channel *channel = result[m] ? tactus_fit_channel_at(result[m], c) : NULL;
 			if (!channel || channel->problem) {
@@ -425,7 +436,9 @@ const struct cli_command cli_fit = {
 		"network; power is conductance with a power law; forward fits all outputs of the domain. --effects adds causes "
 		"of the catalogue to a forward model; -m refits a model file, on the columns that it names. The model file "
 		"keeps where it came from, and which conditions (temperature_degC, drive_V, ...) stayed within 1 %.\n\n"
-		"Errors are root mean squares of estimate minus reference, in sample and held out. Held out means blocked "
+		"Errors are root mean squares of estimate minus reference, in the unit of the column that plays the load "
+		"(--input; "
+		"keys of files and of --json end in _N whatever it is), in sample and held out. Held out means blocked "
 		"cross-validation: where the load cycles at least as often as there are folds, whole cycles are left out; else "
 		"whole holds (stretches in which the load stays within 1 % of its range: the steps of a staircase). A fold "
 		"leaves out up to four contiguous blocks of them, spread over the recording, and trains on the rest less the "

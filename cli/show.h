@@ -11,5 +11,7 @@ int cli_show_effects(const struct cli *cli, const char *name);
 
 /* "12.34 ± 0.05 N", with as many digits as the standard error (NaN: none) bears; written to text and returned. */
 const char *cli_value_text(double value, double standard_error, const char *unit, char text[96]);
+/* The unit that a column's name ends in; all of the name where it has none. */
+const char *cli_unit_of(const char *column);
 
 #endif

@@ -44,16 +44,16 @@ static void print_effects(const tactus_model *model)
 	fputc('\n', stdout);
 }
 
-static const char *unit_of(const char *column)
+const char *cli_unit_of(const char *column)
 {
 	const char *suffix = strrchr(column, '_');
-	return suffix ? suffix + 1 : "";
+	return suffix ? suffix + 1 : column;
 }
 
 static void print_facts(const tactus_model *model, size_t channel)
 {
 	tactus_channel_facts facts = tactus_model_facts(model, channel);
-	const char *unit = unit_of(tactus_model_input(model));
+	const char *unit = cli_unit_of(tactus_model_input(model));
 	if (facts.samples)
 		printf("  calibrated on %zu samples\n", facts.samples);
 	if (!isnan(facts.input_min))
@@ -73,7 +73,7 @@ static void print_facts(const tactus_model *model, size_t channel)
 			printf(" from %.4g to %.4g", reading.reading_min, reading.reading_max);
 		if (!isnan(reading.residual_std))
 			printf(", residual %.3g", reading.residual_std);
-		printf(" %s\n", unit_of(reading.column));
+		printf(" %s\n", cli_unit_of(reading.column));
 	}
 }
 

@@ -33,8 +33,10 @@ const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tact
 	return NULL;
 }
 
-/* What may follow "output0" in a parameter's unit. */
-static const char *const unit_tails[] = {"", "/N", "/degC"};
+/* Units of parameters that are said in those of a model's columns. */
+static const char *const own_units[] = {"output0",      "output0/N", "output0/degC", "output1", "output1/N",
+										"output1/degC", "N",         "1/N",          "1/N2",    "1/N/s",
+										"1/N2/s",       "N/S",       "N/F"};
 
 const char *tactus_form_name(enum tactus_form form)
 {
@@ -73,7 +75,7 @@ tactus_model *tactus_model_new(const tactus_domain *domain, enum tactus_form for
 	model->domain = domain;
 	model->form = form;
 	model->provenance = tactus_metadata_new();
-	model->unit_text = calloc((size_t)TACTUS_OUTPUTS_MAX * TACTUS_COUNT(unit_tails), sizeof *model->unit_text);
+	model->unit_text = calloc(TACTUS_COUNT(own_units), sizeof *model->unit_text);
 	if (!model->provenance || !model->unit_text) {
 		tactus_model_free(model);
 		return NULL;
@@ -248,20 +250,46 @@ tactus_metadata *tactus_model_provenance(const tactus_model *model)
 
 /* ---- parameters: base, then effects, then the estimator's, as one list ---- */
 
+/* The column whose unit a factor of a parameter's unit stands for ("N" the input's), NULL: none. */
+static const char *column_of_factor(const tactus_model *model, const char *factor, size_t length)
+{
+	if (length == 7 && memcmp(factor, "output", 6) == 0) {
+		size_t output = factor[6] == '1' ? 1 : 0;
+		return model->output_name[output] ? model->output_name[output]
+										  : tactus_domain_signal(model->domain, TACTUS_ROLE_OUTPUT, output)->name;
+	}
+	bool input = *factor == 'N' && (length == 1 || (length == 2 && factor[1] == '2'));
+	return input ? tactus_model_input(model) : NULL;
+}
+
+/* One factor in this model's words, behind `used` characters of text; how many there are then. */
+static size_t put_factor(const tactus_model *model, const char *factor, size_t length, char *text, size_t used)
+{
+	const char *column = column_of_factor(model, factor, length);
+	if (column) {
+		const char *suffix = strrchr(column, '_'), *power = factor[length - 1] == '2' ? "2" : "";
+		return used +
+			   (size_t)snprintf(text + used, TACTUS_UNIT_SIZE - used, "%.20s%s", suffix ? suffix + 1 : column, power);
+	}
+	return used + (size_t)snprintf(text + used, TACTUS_UNIT_SIZE - used, "%.*s", (int)length, factor);
+}
+
 const char *tactus_model_unit(const tactus_model *model, const char *unit)
 {
-	if (strncmp(unit, "output", 6) != 0)
+	size_t own = 0, used = 0;
+	while (own < TACTUS_COUNT(own_units) && strcmp(unit, own_units[own]) != 0)
+		own++;
+	if (own == TACTUS_COUNT(own_units))
 		return unit;
-	size_t output = unit[6] == '1' ? 1 : 0, tail = 0;
-	while (tail + 1 < TACTUS_COUNT(unit_tails) && strcmp(unit + 7, unit_tails[tail]) != 0)
-		tail++;
-	const char *name = model->output_name[output];
-	if (!name)
-		name = tactus_domain_signal(model->domain, TACTUS_ROLE_OUTPUT, output)->name;
-	const char *suffix = strrchr(name, '_');
-	char *text = model->unit_text[output * TACTUS_COUNT(unit_tails) + tail];
-	snprintf(text, sizeof *model->unit_text, "%s%s", suffix ? suffix + 1 : "", unit_tails[tail]);
-	return text;
+	char *text = model->unit_text[own];
+	for (const char *factor = unit;; factor++) {
+		size_t length = strcspn(factor, "/");
+		used = put_factor(model, factor, length, text, used);
+		factor += length;
+		if (!*factor)
+			return text;
+		text[used++] = '/';
+	}
 }
 
 /* A parameter of an output that is not modelled is none of this model's. */
@@ -307,8 +335,12 @@ static bool find_place(const tactus_model *model, size_t channel_index, size_t i
 	const char *const *names = forms[model->form].parameters;
 	for (size_t k = 0; names[k]; k++)
 		if (i-- == 0) {
-			*place = (struct place){
-				NULL, "", names[k], forms[model->form].units[k], &data->estimator[k], &data->estimator_std[k]};
+			*place = (struct place){NULL,
+									"",
+									names[k],
+									tactus_model_unit(model, forms[model->form].units[k]),
+									&data->estimator[k],
+									&data->estimator_std[k]};
 			return true;
 		}
 	return false;

@@ -33,6 +33,9 @@ typedef struct {
 	size_t samples;
 } tactus_model_channel_data;
 
+/* Room for a unit such as "um/V": of a column's own unit 20 characters are kept. */
+enum { TACTUS_UNIT_SIZE = 48 };
+
 struct tactus_model {
 	const tactus_domain *domain;
 	enum tactus_form form;
@@ -44,7 +47,7 @@ struct tactus_model {
 	tactus_model_channel_data *channels;
 	size_t channel_count;
 	tactus_metadata *provenance;
-	char (*unit_text)[24]; /* what tactus_model_unit() returns pointers into */
+	char (*unit_text)[TACTUS_UNIT_SIZE]; /* what tactus_model_unit() returns pointers into */
 };
 
 /* A model without channels; every number NaN. NULL when memory runs out. */
@@ -68,7 +71,7 @@ const char *const *tactus_estimator_units(enum tactus_form form);
 int tactus_form_find(const char *name);
 /* True if the form uses the domain's base equations. */
 bool tactus_form_has_base(enum tactus_form form);
-/* The unit that "output0" or "output1/N" stands for in this model; any other unit as it is. Owned by the model. */
+/* The unit that "output0", "1/N" or "output1/N" stands for in this model; any other as it is. Owned by the model. */
 const char *tactus_model_unit(const tactus_model *model, const char *unit);
 
 #ifdef __cplusplus

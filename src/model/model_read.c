@@ -77,7 +77,8 @@ static int read_values(const tactus_model *model, const tactus_toml_node *node, 
 	const char *const *names = tactus_estimator_parameters(model->form);
 	const char *const *units = tactus_estimator_units(model->form);
 	for (size_t i = 0; names[i]; i++) {
-		status = read_value(table, names[i], units[i], NULL, &data->estimator[i], &data->estimator_std[i]);
+		status = read_value(table, names[i], tactus_model_unit(model, units[i]), NULL, &data->estimator[i],
+							&data->estimator_std[i]);
 		if (status < 0)
 			return status;
 	}

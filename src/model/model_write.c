@@ -98,7 +98,7 @@ static void put_channel(FILE *file, const tactus_model *model, const tactus_mode
 	if (names[0])
 		fputs("[channel.estimator]\n", file);
 	for (size_t i = 0; names[i]; i++)
-		put_value(file, names[i], units[i], data->estimator[i], data->estimator_std[i]);
+		put_value(file, names[i], tactus_model_unit(model, units[i]), data->estimator[i], data->estimator_std[i]);
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
 		if (!model->output_name[o] || (isnan(data->residual_std[o]) && isnan(data->output_min[o])))
 			continue;

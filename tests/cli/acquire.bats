@@ -307,6 +307,21 @@ columns() { grep -v '^#' | head -1; }
 	done
 }
 
+@test "fit --input: errors and parameters are in the unit of the column that plays the load" {
+	awk 'BEGIN { print "time_s,voltage_V,displacement_um"; for (i = 0; i < 90; i++) { v = i % 30 * 5; print i / 10 "," v "," 1 + 0.13 * v + i % 7 / 10 } }' >piezo.csv
+	tactus fit piezo.csv --input voltage_V --output displacement_um --model power -o piezo.toml >table
+	head -1 table | grep -q '^Error of voltage_V in sample'
+	sed -n 6p table | grep -q '^ *V  *V  *%'
+	grep -q 'g1 .* um/V$' table
+	grep -q 'reference_load_N .* V$' table
+	! grep -q 'N$' table
+	tactus show piezo.toml | grep -q 'g1 .* um/V$'
+	# The file that says so is read back, and errors keep their unit.
+	tactus force -m piezo.toml piezo.csv | column force_estimate_N | grep -c . | grep -qx 90
+	tactus fit piezo.csv --input voltage_V --output displacement_um --model all | sed -n 2p | grep -q '^ *V  *V  *%'
+	tactus fit piezo.csv --input voltage_V --output displacement_um --json | jq -e '.fit.input == "voltage_V"'
+}
+
 @test "fit: real recordings of others" {
 	[ -d "$data" ] || skip "the real recordings are not at ../shared/data"
 	tactus fit "$data/tactile_cell_bare.csv" -o cell.toml

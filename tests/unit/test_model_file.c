@@ -198,6 +198,28 @@ static void a_file_is_not_overwritten_unasked_and_nothing_is_left_beside_it(void
 	tactus_model_free(model);
 }
 
+/* Another column as load or reading: no parameter of any effect goes on in newtons or siemens. */
+static void units_are_those_of_the_columns(void **state)
+{
+	(void)state;
+	const tactus_domain *domain = tactus_domain_find("sensor");
+	tactus_model *model = tactus_model_new(domain, TACTUS_FORM_FORWARD);
+	assert_non_null(model);
+	assert_string_equal(tactus_model_unit(model, "output0/N"), "S/N");
+	model->input_name = tactus_strndup("voltage_V", 9);
+	model->output_name[0] = tactus_strndup("displacement_um", 15);
+	assert_string_equal(tactus_model_unit(model, "output0/N"), "um/V");
+	assert_string_equal(tactus_model_unit(model, "1/N2/s"), "1/V2/s");
+	const tactus_effect *effect;
+	for (size_t e = 0; (effect = domain->effects[e]) != NULL; e++)
+		for (size_t p = 0; p < effect->parameter_count; p++) {
+			const char *unit = tactus_model_unit(model, effect->parameters[p].unit);
+			if (strchr(unit, 'N') || strstr(unit, "output"))
+				fail_msg("%s of %s is in %s", effect->parameters[p].name, effect->name, unit);
+		}
+	tactus_model_free(model);
+}
+
 static void parameters_are_set_by_name_within_their_bounds(void **state)
 {
 	(void)state;
@@ -241,6 +263,7 @@ int main(void)
 		cmocka_unit_test(a_channel_overrides_what_holds_for_all),
 		cmocka_unit_test(every_mistake_is_told_with_its_place),
 		cmocka_unit_test(a_file_is_not_overwritten_unasked_and_nothing_is_left_beside_it),
+		cmocka_unit_test(units_are_those_of_the_columns),
 		cmocka_unit_test(parameters_are_set_by_name_within_their_bounds),
 	};
 	return cmocka_run_group_tests(tests, make_folder, remove_folder);
