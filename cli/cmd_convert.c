@@ -23,6 +23,18 @@ tactus_convert_options cli_convert_options(const struct cli *cli)
 	};
 }
 
+/* `ok` then says less than it seems to: a guess of the uncertainty would be worse, silence too. */
+static void note_uncertainty(const struct cli *cli, const tactus_table *block, const tactus_metadata *metadata)
+{
+	static const char *const names[] = {"amplitude_std_V", "phase_std_rad", "dc_std_V"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (tactus_table_find(block, names[i]) >= 0 || tactus_metadata_get(metadata, names[i]))
+			return;
+	cli_note(cli, "how well the volts are known is not stated (--amplitude-std, --phase-std, --dc-std, or adc_bits and "
+				  "adc_range_V in the recording): no standard uncertainties, and no row can be found folded or "
+				  "ill-conditioned");
+}
+
 static int convert_recording(const struct cli *cli, const char *recording)
 {
 	tactus_read_options how = cli_read_options(cli);
@@ -34,6 +46,8 @@ static int convert_recording(const struct cli *cli, const char *recording)
 	if (error)
 		return cli_fail(cli, error);
 	error = tactus_converter_new(tactus_reader_block(reader), &options, &converter);
+	if (!error)
+		note_uncertainty(cli, tactus_reader_block(reader), tactus_table_metadata(tactus_reader_block(reader)));
 	int status = error ? cli_fail(cli, error) : cli_stream(cli, reader, convert, converter);
 	if (!error)
 		tactus_converter_free(converter);
@@ -60,7 +74,8 @@ static const struct cli_option options[] = {
 	{"phase-std", 0, CLI_QUANTITY, "ANGLE", "rad", "standard uncertainty of a phase, e.g. 0.2deg"},
 	{"dc-std", 0, CLI_QUANTITY, "V", "V", "standard uncertainty of a DC voltage"},
 	{"waveform", 'w', CLI_CHOICE, "FORMAT", "csv|int16|float32", "the input is raw samples: demodulate them first"},
-	{"sample-rate", 0, CLI_QUANTITY, "RATE", "Hz", "samples per second (default in csv: told by time_s)"},
+	{"sample-rate", 0, CLI_QUANTITY, "RATE", "Hz",
+	 "samples per second (default in csv with drive_sample_V: told by time_s)"},
 	{"sample-scale", 0, CLI_QUANTITY, "V", "V", "volts at the amplifier's output per unit of a sample"},
 	{"drive-sampled", 0, CLI_FLAG, NULL, NULL, "int16, float32: every second sample is the drive's"},
 	{"drive-scale", 0, CLI_QUANTITY, "V", "V", "volts of the drive per unit of a sample of it"},
@@ -91,7 +106,9 @@ const struct cli_command cli_convert = {
 		"is no such column. The amplifier's resistor is metadata, gain_resistor_ohm, or --gain-resistor; it is not "
 		"guessed. What was used is recorded in the metadata of the output.\n\n"
 		"The standard uncertainties follow to first order from amplitude_std_V, phase_std_rad and dc_std_V (metadata, "
-		"options, or the ADC's step from adc_bits and adc_range_V); without any they are empty. The circuit is the "
+		"options, or the ADC's step from adc_bits and adc_range_V); without any they are empty, folded and "
+		"ill-conditioned are found in no row, and a "
+		"note says so: an uncertainty is not guessed either. The circuit is the "
 		"known switch in series with the sensor and, beside the sensor, the known lead capacitance.\n\n"
 		"quality is ok, or the reasons not to trust the row, joined by +: wrong-sign (R, G or C came out negative), "
 		"folded (the phase is within its uncertainty of 0 or 180 degrees, where a phase detector folds), clipped, "

@@ -43,6 +43,25 @@ cell() { column "$1" <"$2" | sed -n "$3p"; } # NAME FILE ROW
 	tactus convert in.csv --amplitude-std 1mV --phase-std 0.001 --dc-std 0.001 --format jsonl | tactus convert --format csv | cmp - once.csv
 }
 
+@test "no uncertainty stated: a note says what cannot be judged; any statement of one silences it" {
+	loads >in.csv
+	run --separate-stderr tactus convert in.csv
+	status_is 0
+	says "not stated (--amplitude-std"
+	says "folded or ill-conditioned"
+	run --separate-stderr tactus convert in.csv --quiet
+	[ -z "$stderr" ]
+	run --separate-stderr tactus convert in.csv --phase-std 1mrad
+	[ -z "$stderr" ]
+	{
+		printf '# adc_bits: 16\n# adc_range_V: 10\n# detector_amplitude_gain: 1\n# detector_dc_gain: 1\n'
+		printf '# detector_phase_supply_V: 5\n# detector_phase_inverted: false\n'
+		cat in.csv
+	} >adc.csv
+	run --separate-stderr tactus convert adc.csv
+	[ -z "$stderr" ]
+}
+
 @test "the standard uncertainties are those of first order" {
 	loads >in.csv
 	tactus convert in.csv >none.csv
