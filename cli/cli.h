@@ -129,8 +129,9 @@ void cli_debug(const struct cli *cli, const char *format, ...) TACTUS_PRINTF(2, 
 const char *cli_wrap(FILE *out, const char *text, size_t column, size_t indent);
 
 /*
- * First SIGINT, SIGTERM or SIGHUP sets cli_signal (a clean stop, exit 128+n), the second ends the program at once. Installed
- * by cli_catch_signals() in commands that acquire; SIGPIPE is ignored everywhere (writers report TACTUS_ERR_CLOSED).
+ * First SIGINT, SIGTERM or SIGHUP sets cli_signal (a clean stop, exit 128+n), the second ends the program at once.
+ * Installed by cli_catch_signals() in commands that acquire; SIGPIPE is ignored everywhere (writers report
+ * TACTUS_ERR_CLOSED).
  */
 extern volatile sig_atomic_t cli_signal;
 void cli_catch_signals(void);
