@@ -19,6 +19,7 @@ static const tactus_backend *const backends[] = {
 	&tactus_backend_usb,    /* Measurement Computing */
 	&tactus_backend_hid,    /* USB scales */
 	&tactus_backend_udp,    /* ATI Net F/T */
+	&tactus_backend_modbus_tcp, &tactus_backend_modbus_rtu,
 };
 
 static int fail_unknown_scheme(const char *uri)

@@ -49,6 +49,7 @@ typedef struct tactus_backend {
 
 struct tactus_device {
 	const tactus_backend *backend;
+	const char *scheme; /* of the URI, where several schemes share a backend; static */
 	void *state;
 	tactus_metadata *metadata;
 	uint64_t expected_scans;
@@ -95,6 +96,8 @@ extern const tactus_backend tactus_backend_serial;
 extern const tactus_backend tactus_backend_usb;
 extern const tactus_backend tactus_backend_hid;
 extern const tactus_backend tactus_backend_udp;
+extern const tactus_backend tactus_backend_modbus_tcp;
+extern const tactus_backend tactus_backend_modbus_rtu;
 
 /* Paces a simulation by the clock: waits until `time_s` after the first call with this state (zero before it). */
 typedef struct {

@@ -46,6 +46,9 @@ tactus_modbus_options tactus_modbus_defaults(bool serial);
  */
 int tactus_modbus_options_read(tactus_uri *uri, tactus_modbus_options *options);
 
+/* Whether a serial port can be set to that speed. */
+bool tactus_modbus_is_baud(int baud);
+
 typedef struct tactus_modbus tactus_modbus;
 
 /*

@@ -21,17 +21,22 @@ tactus_modbus_options tactus_modbus_defaults(bool serial)
 	return options;
 }
 
+bool tactus_modbus_is_baud(int baud)
+{
+	for (size_t i = 0; i < TACTUS_COUNT(bauds); i++)
+		if (bauds[i] == baud)
+			return true;
+	return false;
+}
+
 static int read_baud(tactus_uri *uri, int *baud)
 {
 	long value = *baud;
-	int code = tactus_uri_integer(uri, "baud", bauds[0], bauds[TACTUS_COUNT(bauds) - 1], &value);
-	for (size_t i = 0; i < TACTUS_COUNT(bauds) && code >= 0; i++)
-		if (bauds[i] == value) {
-			*baud = (int)value;
-			return TACTUS_OK;
-		}
-	return code < 0 ? code
-					: tactus_fail(TACTUS_ERR_ARGUMENT, "%s: %ld baud is no speed of a serial port", uri->scheme, value);
+	const int code = tactus_uri_integer(uri, "baud", bauds[0], bauds[TACTUS_COUNT(bauds) - 1], &value);
+	if (code >= 0 && !tactus_modbus_is_baud((int)value))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "%s: %ld baud is no speed of a serial port", uri->scheme, value);
+	*baud = (int)value;
+	return code;
 }
 
 static int read_line(tactus_uri *uri, tactus_modbus_options *o)
