@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "cli.h"
+#include "operator.h"
 #include "tare.h"
 
 enum { READINGS = 4096, RECONNECT_S = 60 };
@@ -24,6 +25,7 @@ struct scan {
 	double after_s; /* --append: added to times and sequence numbers */
 	uint64_t after_scans;
 	struct cli_tare tare;        /* --tare */
+	struct cli_operator person;  /* --protocol on a real bench */
 	uint64_t first, last, scans; /* sequence numbers, and how many scans came */
 	bool progress;
 	double shown_s;
@@ -235,6 +237,17 @@ static void show_progress(struct scan *scan, double since_s, bool end)
 		fprintf(stderr, "\r\033[Kscan %llu", (unsigned long long)done);
 }
 
+/* Tells the person at the bench what to apply now. */
+static void prompt(struct scan *scan, double since_s)
+{
+	char text[64];
+	if (!cli_operator_say(&scan->person, clock_s() - since_s, text, sizeof text))
+		return;
+	if (scan->progress)
+		fputs("\r\033[K", stderr);
+	cli_note(scan->cli, "%s", text);
+}
+
 /* What is lost on the way is looked for, unless --no-reconnect; else as tactus_device_read(). */
 static long next_readings(struct scan *scan, tactus_reading *readings, size_t max)
 {
@@ -289,6 +302,7 @@ static int acquire(struct scan *scan)
 	const double since_s = clock_s();
 	int error = !readings ? TACTUS_ERR_MEMORY : cli_has(scan->cli, "tare") ? hold_first_second(scan) : 0;
 	while (!error && !cli_signal) {
+		prompt(scan, since_s);
 		const long n = next_readings(scan, readings, READINGS);
 		if (n == 0)
 			break;
@@ -376,6 +390,7 @@ static void free_scan(struct scan *scan)
 	tactus_device_close(scan->device);
 	tactus_model_free(scan->model);
 	cli_tare_free(&scan->tare);
+	cli_operator_end(&scan->person);
 }
 
 static int check_usage(const struct cli *cli)
@@ -434,6 +449,8 @@ static int run(struct cli *cli)
 		error = open_reference(cli, scan.device);
 	if (!error)
 		error = tactus_device_start(scan.device, &asked);
+	if (!error && tactus_device_is_live(scan.device))
+		error = cli_operator_begin(&scan.person, asked.protocol);
 	status = error ? cli_fail(cli, error) : run_started(&scan, share);
 	free_scan(&scan);
 	free(channels);
@@ -449,7 +466,7 @@ static const struct cli_option options[] = {
 	{"settle", 0, CLI_QUANTITY, "TIME", "s", "time to settle after every switch"},
 	{"count", 0, CLI_INTEGER, "SCANS", NULL, "stop after so many scans"},
 	{"duration", 0, CLI_QUANTITY, "TIME", "s", "stop after that time"},
-	{"protocol", 0, CLI_STRING, "TEXT", NULL, "the load to apply: 'rest 2s, sine 0.5Hz 1N..3N 60s' (simulated)"},
+	{"protocol", 0, CLI_STRING, "TEXT", NULL, "the load to apply: 'rest 2s, sine 0.5Hz 1N..3N 60s'"},
 	{"loads", 0, CLI_FILE, "standard|FILE", NULL, "known loads in place of the sensors (simulated)"},
 	{"seed", 0, CLI_INTEGER, "NUMBER", NULL, "other random numbers than the bench's (simulated)"},
 	{"realtime", 0, CLI_FLAG, NULL, NULL, "by the clock, not as fast as possible (simulated, replay)"},
@@ -487,6 +504,8 @@ const struct cli_command cli_scan = {
 		"long as the bench's own protocol, whose last load stays on when a count or a duration asks for more. With "
 		"--loads "
 		"it ends when every known load has met every frequency and drive.\n\n"
+		"On a simulated bench the load of --protocol is applied; at a real one the person there is told what to apply "
+		"when.\n\n"
 		"The language of protocols is described in tactus-protocol(7), bench files and files of loads in "
 		"tactus-bench(7).\n\n"
 		"sim:FILE.toml is a bench of your own. Its file says base = \"paredes\" or \"lebosse\" and what differs, and "

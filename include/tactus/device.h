@@ -105,6 +105,8 @@ TACTUS_API int tactus_device_stop(tactus_device *device);
  */
 TACTUS_API int tactus_device_recover(tactus_device *device, double timeout_s);
 TACTUS_API tactus_faults tactus_device_faults(const tactus_device *device);
+/** Whether it runs by the clock, as real and emulated devices do: a protocol's load is then applied by hand. */
+TACTUS_API bool tactus_device_is_live(const tactus_device *device);
 /** Whether the running scan's readings have amplitudes and phases, to be converted; else further columns alone. */
 TACTUS_API bool tactus_device_has_amplitudes(const tactus_device *device);
 /** The name of the i-th further column that the running scan's readings have, NULL past the last. Owned by the device.

@@ -244,6 +244,11 @@ int tactus_device_add_extra(tactus_device *device, const char *name)
 	return TACTUS_OK;
 }
 
+bool tactus_device_is_live(const tactus_device *device)
+{
+	return device->backend->live;
+}
+
 bool tactus_device_has_amplitudes(const tactus_device *device)
 {
 	return !device->has_no_amplitudes;

@@ -263,10 +263,15 @@ static bool is_empty(const serial *s, size_t length)
 
 /* ---- start ---- */
 
-/* Finds the columns in a header line, unless they are known; fails after a while without one. */
+/*
+ * Finds the columns in a header line, unless they are known: the last line of names before a line of as many numbers.
+ * "Ready" is a name too. Fails after a while without one.
+ */
 static int wait_header(serial *s, int64_t until_ns)
 {
 	while (!s->has_columns) {
+		tactus_lines header;
+		double values[TACTUS_LINE_FIELDS_MAX];
 		size_t length;
 		const int code = next_line(s, until_ns, &length);
 		if (code < 0)
@@ -276,7 +281,10 @@ static int wait_header(serial *s, int64_t until_ns)
 							   "%s: no header line came within %d s that says what the numbers are; say it in the URI: "
 							   "serial:%s?columns=force_N,…",
 							   s->port.name, FIRST_LINE_S, s->port.name);
-		s->has_columns = tactus_lines_header(s->buffer, length, &s->lines);
+		if (tactus_lines_header(s->buffer, length, &header))
+			s->lines = header;
+		else
+			s->has_columns = s->lines.count > 0 && tactus_lines_read(&s->lines, s->buffer, length, values);
 		drop_line(s, length);
 	}
 	return TACTUS_OK;

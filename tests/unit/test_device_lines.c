@@ -197,7 +197,7 @@ static void counted(int i, char *line, size_t size)
 static void test_the_boards_own_count_shows_what_it_skipped(void **state)
 {
 	(void)state;
-	board b = {.head = "sequence,force_N\n", .print = counted, .lines = 1000000};
+	board b = {.head = "Ready\nsequence,force_N\n", .print = counted, .lines = 1000000};
 	tactus_device *device = open_board(&b, "");
 	tactus_scan_settings settings = tactus_scan_defaults();
 	settings.count = 40;
