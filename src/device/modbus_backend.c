@@ -13,7 +13,7 @@ enum { BASES_MAX = 8 };
 static const struct {
 	const char *driver;
 	const tactus_backend *backend;
-} drivers[] = {{"registers", &tactus_modbus_registers}};
+} drivers[] = {{"registers", &tactus_modbus_registers}, {"robotiq", &tactus_modbus_robotiq}};
 
 int tactus_profile_find(const char *name, const char **text)
 {

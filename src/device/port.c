@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <libserialport.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,38 +59,21 @@ static int open_known(struct sp_port *known, const char *name, int baud)
 	return fd < 0 ? fail_open(name) : fd;
 }
 
-static void copy(char *to, size_t size, const char *from)
-{
-	snprintf(to, size, "%s", from != NULL ? from : "");
-}
-
-static void know(const struct sp_port *known, tactus_port *port)
-{
-	if (sp_get_port_transport(known) != SP_TRANSPORT_USB ||
-		sp_get_port_usb_vid_pid(known, &port->vid, &port->pid) != SP_OK)
-		return;
-	copy(port->serial, sizeof(port->serial), sp_get_port_usb_serial(known));
-	copy(port->product, sizeof(port->product), sp_get_port_usb_product(known));
-}
-
-int tactus_port_open(const char *name, int baud, tactus_port *port)
+int tactus_port_open(const char *name, int baud, tactus_serial_identity *identity)
 {
 	struct sp_port *known = NULL;
-	char real[TACTUS_PORT_NAME];
-	char *resolved = realpath(name, NULL); /* /dev/serial/by-id/… is a link */
-	if (resolved == NULL)
+	char *real = realpath(name, NULL); /* /dev/serial/by-id/… is a link */
+	if (real == NULL)
 		return fail_open(name);
-	copy(real, sizeof(real), resolved);
-	free(resolved);
-	*port = (tactus_port){0};
-	copy(port->name, sizeof(port->name), name);
+	tactus_serial_identify(name, identity);
 	if (sp_get_port_by_name(real, &known) == SP_OK) {
-		know(known, port);
 		const int fd = open_known(known, name, baud);
 		sp_free_port(known);
+		free(real);
 		return fd;
 	}
 	const int fd = open(real, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+	free(real);
 	if (fd < 0)
 		return fail_open(name);
 	const int code = make_raw(fd, name);
@@ -100,45 +84,24 @@ int tactus_port_open(const char *name, int baud, tactus_port *port)
 
 /* ---- finding ---- */
 
-static bool is_same(const struct sp_port *candidate, const tactus_port *port)
+int tactus_port_reopen(const tactus_serial_identity *identity, int baud)
 {
-	int vid = 0, pid = 0;
-	if (sp_get_port_transport(candidate) != SP_TRANSPORT_USB ||
-		sp_get_port_usb_vid_pid(candidate, &vid, &pid) != SP_OK || vid != port->vid || pid != port->pid)
-		return false;
-	const char *serial = sp_get_port_usb_serial(candidate);
-	return strcmp(serial != NULL ? serial : "", port->serial) == 0;
-}
-
-int tactus_port_reopen(tactus_port *port, int baud)
-{
-	struct sp_port **all = NULL;
-	char found[TACTUS_PORT_NAME] = "";
-	size_t alike = 0;
-	if (port->vid != 0 && sp_list_ports(&all) == SP_OK) {
-		for (size_t i = 0; all[i] != NULL; i++)
-			if (is_same(all[i], port)) {
-				copy(found, sizeof(found), sp_get_port_name(all[i]));
-				alike++;
-			}
-		sp_free_port_list(all);
-	}
-	/* Adapters without serial numbers may be twins: then only the old name can be meant. */
-	if (port->vid != 0 && alike == 0)
-		return tactus_fail(TACTUS_ERR_LOST, "%s: the adapter %04x:%04x is not plugged in", port->name,
-						   (unsigned)port->vid, (unsigned)port->pid);
-	tactus_port now;
-	const int fd = tactus_port_open(alike == 1 ? found : port->name, baud, &now);
+	char path[PATH_MAX];
+	tactus_serial_identity again;
+	if (!tactus_serial_find(identity, path, sizeof(path)))
+		return tactus_fail(TACTUS_ERR_LOST, "%s: not plugged in", identity->path);
+	const int fd = tactus_port_open(path, baud, &again);
 	return fd < 0 ? tactus_fail(TACTUS_ERR_LOST, "%s", tactus_error_message()) : fd;
 }
 
-void tactus_port_identity(const tactus_port *port, char *text, size_t size)
+void tactus_port_describe(const tactus_serial_identity *identity, char *text, size_t size)
 {
-	if (port->vid == 0)
-		snprintf(text, size, "%s", port->name);
+	const bool usb = identity->vendor[0] != '\0', numbered = identity->serial[0] != '\0';
+	if (usb)
+		snprintf(text, size, "%s (usb %s:%s%s%s)", identity->path, identity->vendor, identity->product,
+				 numbered ? " " : "", identity->serial);
 	else
-		snprintf(text, size, "usb-%04x:%04x%s%s%s%s", (unsigned)port->vid, (unsigned)port->pid,
-				 port->serial[0] != '\0' ? "-" : "", port->serial, port->product[0] != '\0' ? " " : "", port->product);
+		snprintf(text, size, "%s", identity->path);
 }
 
 bool tactus_port_list(bool (*found)(void *context, const char *name, const char *description), void *context)

@@ -3,6 +3,7 @@
  * says, a profile, or a header line that the device prints when it is opened.
  */
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -44,7 +45,7 @@ static const struct {
 enum { NOWHERE = -1, SEQUENCE = -2 };
 
 typedef struct {
-	tactus_port port;
+	tactus_serial_identity port;
 	int fd, baud;
 	double timeout_s; /* of the URI or the profile; NaN: none */
 	double silence_s; /* of the running scan */
@@ -207,7 +208,7 @@ static void serial_close(tactus_device *device)
 
 static int fail_lost(const serial *s, const char *why)
 {
-	return tactus_fail(TACTUS_ERR_LOST, "%s: lost (%s)", s->port.name, why);
+	return tactus_fail(TACTUS_ERR_LOST, "%s: lost (%s)", s->port.path, why);
 }
 
 /* More bytes: 1, 0 at the instant, TACTUS_ERR_LOST, TACTUS_ERR_INTERRUPTED. */
@@ -280,7 +281,7 @@ static int wait_header(serial *s, int64_t until_ns)
 			return tactus_fail(TACTUS_ERR_DEVICE,
 							   "%s: no header line came within %d s that says what the numbers are; say it in the URI: "
 							   "serial:%s?columns=force_N,…",
-							   s->port.name, FIRST_LINE_S, s->port.name);
+							   s->port.path, FIRST_LINE_S, s->port.path);
 		if (tactus_lines_header(s->buffer, length, &header))
 			s->lines = header;
 		else
@@ -372,7 +373,7 @@ static int choose_channels(serial *s, const tactus_scan_settings *settings)
 		for (size_t k = 0; k < s->channel_count; k++)
 			there = there || (s->channels[k] == settings->channels[i] && s->channels[k] > 0);
 		if (!there || i == CHANNELS_MAX)
-			return tactus_fail(TACTUS_ERR_ARGUMENT, "%s: no column is of channel %d", s->port.name,
+			return tactus_fail(TACTUS_ERR_ARGUMENT, "%s: no column is of channel %d", s->port.path,
 							   settings->channels[i]);
 	}
 	s->channel_count = settings->channel_count;
@@ -398,7 +399,7 @@ static int refuse_settings(const serial *s, const tactus_scan_settings *settings
 				TACTUS_ERR_ARGUMENT,
 				"%s: the board goes its own way: no other %s (drive=, frequency= and gain_resistor= in the "
 				"URI say what it does)",
-				s->port.name, fixed[i].name);
+				s->port.path, fixed[i].name);
 	return TACTUS_OK;
 }
 
@@ -417,7 +418,7 @@ static int warm_up(serial *s, tactus_device *device)
 			break;
 		if (code == 0)
 			return tactus_fail(TACTUS_ERR_DEVICE, "%s: no line of %zu numbers came within %d s at %d baud",
-							   s->port.name, s->lines.count, FIRST_LINE_S, s->baud);
+							   s->port.path, s->lines.count, FIRST_LINE_S, s->baud);
 		now_ns = tactus_clock_ns();
 		if (tactus_lines_read(&s->lines, s->buffer, length, values)) {
 			if (n++ > 0)
@@ -434,7 +435,7 @@ static int set_metadata(const serial *s, tactus_device *device)
 	char now[32], identity[512];
 	tactus_metadata *m = device->metadata;
 	tactus_now_text(now);
-	tactus_port_identity(&s->port, identity, sizeof(identity));
+	tactus_port_describe(&s->port, identity, sizeof(identity));
 	int code = tactus_metadata_set(m, "tactus", tactus_version());
 	code = code < 0 ? code : tactus_metadata_set(m, "start", now);
 	code = code < 0 ? code : tactus_metadata_set(m, "device", identity);
@@ -576,7 +577,7 @@ struct listing {
 static bool found_port(void *context, const char *name, const char *description)
 {
 	const struct listing *listing = context;
-	char uri[TACTUS_PORT_NAME + 16];
+	char uri[PATH_MAX + 16];
 	snprintf(uri, sizeof(uri), "serial:%s", name);
 	return listing->found(listing->context, uri, description);
 }
