@@ -288,7 +288,7 @@ threaded: $(THREADED)
 FUZZ_SECONDS ?= 120
 FUZZ := $(patsubst tests/fuzz/%.c,$(BUILD)/%,$(wildcard tests/fuzz/fuzz_*.c))
 .PHONY: fuzz
-fuzz: $(PROGRAM) ## fuzz recordings, models, protocols and the diagnosis for FUZZ_SECONDS (120) in all
+fuzz: $(PROGRAM) ## fuzz recordings, models, protocols, the diagnosis and what devices send for FUZZ_SECONDS (120)
 	+@$(parallel) BUILD=$(BUILD)/fuzz CC=clang CXX=clang++ OPT='-O1 -gline-tables-only' WERROR= \
 		CXXFLAGS='-O2 -fno-sanitize=undefined' \
 		SANITIZE='-fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer' fuzzers
