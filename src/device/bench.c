@@ -198,6 +198,11 @@ static int check(const tactus_toml_node *root, const tactus_bench *bench)
 		return tactus_toml_fail(root, "wiring", TACTUS_ERR_INPUT,
 								"switch_lines has %zu lines for %zu sensors, which are in the order of their channels",
 								bench->wiring.switch_count, bench->sensor_count);
+	if (bench->wiring.waveform_count > bench->sensor_count)
+		return tactus_toml_fail(
+			root, "wiring", TACTUS_ERR_INPUT,
+			"waveform_inputs has %zu inputs for %zu sensors, which are in the order of their channels",
+			bench->wiring.waveform_count, bench->sensor_count);
 	if (tactus_protocol_parse(bench->protocol, 1, &protocol) < 0)
 		return tactus_toml_fail(root, "protocol", TACTUS_ERR_INPUT, "%s", tactus_error_message());
 	tactus_protocol_free(protocol);
@@ -277,6 +282,7 @@ static void set_defaults(tactus_bench *bench)
 		.amplitude_input = -1,
 		.phase_input = -1,
 		.dc_input = -1,
+		.drive_input = -1,
 	};
 }
 

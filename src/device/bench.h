@@ -46,6 +46,10 @@ typedef struct {
 	int dc_output;         /* analog output that is the DC source */
 	double dc_output_gain; /* volts at the sensors per volt of that output */
 	int amplitude_input, phase_input, dc_input;
+	/* Where waveforms are sampled in place of detectors: the drive, and the amplifiers of the first sensors (none: one
+	 * behind the switches, at amplitude_input). */
+	int drive_input, waveform_inputs[TACTUS_BENCH_SENSORS_MAX];
+	size_t waveform_count;
 	double input_range_V; /* largest magnitude that the inputs are set to take; 0: the device's widest */
 } tactus_wiring;
 

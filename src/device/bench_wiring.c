@@ -18,29 +18,27 @@ static int read_index(const tactus_toml_node *wiring, const char *key, int end, 
 	return status;
 }
 
-static int read_lines(const tactus_toml_node *wiring, tactus_wiring *w)
+/* An array of whole numbers from 0 to below `end`, each another one: one for each sensor. */
+static int read_indices(const tactus_toml_node *wiring, const char *key, int end, int *indices, size_t *count)
 {
-	const tactus_toml_node *lines = NULL;
-	int status = tactus_toml_array(wiring, "switch_lines", &lines);
+	const tactus_toml_node *array = NULL;
+	int status = tactus_toml_array(wiring, key, &array);
 	if (status <= 0)
 		return status;
-	w->switch_count = tactus_toml_size(lines);
-	if (w->switch_count > TACTUS_BENCH_SENSORS_MAX)
-		return tactus_toml_fail(wiring, "switch_lines", TACTUS_ERR_INPUT, "at most %d switches",
-								TACTUS_BENCH_SENSORS_MAX);
-	for (size_t i = 0; i < w->switch_count; i++) {
-		double line = -1;
-		status = tactus_toml_item_number(lines, i, &line);
+	*count = tactus_toml_size(array);
+	if (*count > TACTUS_BENCH_SENSORS_MAX)
+		return tactus_toml_fail(wiring, key, TACTUS_ERR_INPUT, "at most %d of %s", TACTUS_BENCH_SENSORS_MAX, key);
+	for (size_t i = 0; i < *count; i++) {
+		double index = -1;
+		status = tactus_toml_item_number(array, i, &index);
 		if (status < 0)
 			return status;
-		if (!(line >= 0 && line < LINES_MAX) || line != (double)(int)line)
-			return tactus_toml_fail(wiring, "switch_lines", TACTUS_ERR_INPUT, "a line is a number from 0 to %d",
-									LINES_MAX - 1);
-		w->switch_lines[i] = (int)line;
+		if (!(index >= 0 && index < end) || index != (double)(int)index)
+			return tactus_toml_fail(wiring, key, TACTUS_ERR_INPUT, "each of %s is a number from 0 to %d", key, end - 1);
+		indices[i] = (int)index;
 		for (size_t k = 0; k < i; k++)
-			if (w->switch_lines[k] == w->switch_lines[i])
-				return tactus_toml_fail(wiring, "switch_lines", TACTUS_ERR_INPUT, "line %d is there twice",
-										w->switch_lines[i]);
+			if (indices[k] == indices[i])
+				return tactus_toml_fail(wiring, key, TACTUS_ERR_INPUT, "%d is twice in %s", indices[i], key);
 	}
 	return TACTUS_OK;
 }
@@ -68,7 +66,8 @@ int tactus_bench_read_wiring(const tactus_toml_node *root, tactus_bench *bench)
 				   {"dc_output", &w->dc_output, INPUTS_MAX},
 				   {"amplitude_input", &w->amplitude_input, INPUTS_MAX},
 				   {"phase_input", &w->phase_input, INPUTS_MAX},
-				   {"dc_input", &w->dc_input, INPUTS_MAX}};
+				   {"dc_input", &w->dc_input, INPUTS_MAX},
+				   {"drive_input", &w->drive_input, INPUTS_MAX}};
 	const tactus_bench_key numbers[] = {
 		{"dc_output_gain", 'n', offsetof(tactus_wiring, dc_output_gain), -1e3, 1e3},
 		{"input_range_V", 'n', offsetof(tactus_wiring, input_range_V), 1e-3, 1e3},
@@ -78,7 +77,9 @@ int tactus_bench_read_wiring(const tactus_toml_node *root, tactus_bench *bench)
 	if (status <= 0)
 		return status;
 	w->present = true;
-	status = read_lines(wiring, w);
+	status = read_indices(wiring, "switch_lines", LINES_MAX, w->switch_lines, &w->switch_count);
+	if (status >= 0)
+		status = read_indices(wiring, "waveform_inputs", INPUTS_MAX, w->waveform_inputs, &w->waveform_count);
 	if (status >= 0)
 		status = read_level(wiring, "switch_active", &w->switch_active_low);
 	if (status >= 0)

@@ -13,14 +13,14 @@ static int check_lines(const tactus_daq *daq)
 {
 	const tactus_wiring *w = &daq->bench->wiring;
 	const uint32_t missing = tactus_wiring_mask(w) & ~daq->lines;
-	if (w->switch_count == 0 && daq->plan.channel_count > 1)
+	if (w->switch_count == 0 && daq->plan.channel_count > 1 && !daq->parallel)
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "%zu channels need switches: the profile's wiring has no switch_lines",
 						   daq->plan.channel_count);
 	for (int i = 0; i < 32; i++)
 		if ((missing >> i & 1) != 0)
 			return tactus_fail(TACTUS_ERR_ARGUMENT, "the profile's wiring uses line %d, which %s does not have", i,
 							   daq->name);
-	if (daq->plan.mode_count > 1 && w->source_line < 0)
+	if (daq->plan.mode_count > 1 && (w->source_line < 0 || daq->parallel))
 		return tactus_fail(TACTUS_ERR_ARGUMENT,
 						   "DC and AC in turn need a switch between the two sources: the profile's "
 						   "wiring has no source_line; --mode chooses one");
@@ -32,7 +32,7 @@ static int check_inputs(const tactus_daq *daq)
 	const tactus_wiring *w = &daq->bench->wiring;
 	for (size_t m = 0; m < TACTUS_COUNT(modes); m++) {
 		int inputs[TACTUS_DAQ_INPUTS];
-		if ((daq->plan.modes & modes[m]) == 0)
+		if ((daq->plan.modes & modes[m]) == 0 || daq->operations->read_waveform != NULL)
 			continue;
 		const size_t n = tactus_wiring_inputs(w, modes[m], inputs);
 		if (n == 0)
@@ -60,6 +60,12 @@ static int check_output(const tactus_daq *daq)
 	const tactus_wiring *w = &daq->bench->wiring;
 	if ((daq->plan.modes & TACTUS_MODE_DC) == 0 || w->dc_output < 0)
 		return TACTUS_OK;
+	if (w->dc_output >= daq->outputs && daq->outputs == 0)
+		return tactus_fail(
+			TACTUS_ERR_ARGUMENT,
+			"the profile's wiring has a dc_output, but %s has no analog output: leave it out and give the "
+			"DC drive from a source of your own",
+			daq->name);
 	if (w->dc_output >= daq->outputs)
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "the profile's wiring uses analog output %d; %s has %d", w->dc_output,
 						   daq->name, daq->outputs);
@@ -77,16 +83,17 @@ int tactus_daq_plan(tactus_daq *daq, tactus_device *device, const char *identity
 {
 	tactus_plan *plan = &daq->plan;
 	int code = tactus_plan_make(plan, daq->bench, settings);
-	const double readings = (double)(plan->channel_count * plan->mode_count);
-	code =
-		code < 0 ? code : tactus_plan_rate(plan, settings, readings * (plan->settle_s + daq->switch_s + daq->read_s));
+	const double readings = daq->parallel ? 1 : (double)(plan->channel_count * plan->mode_count);
+	const double each_s = daq->parallel ? daq->read_s : plan->settle_s + daq->switch_s + daq->read_s;
+	const bool waveforms = daq->operations->read_waveform != NULL;
+	code = code < 0 ? code : tactus_plan_rate(plan, settings, readings * each_s);
 	code = code < 0 ? code : check_lines(daq);
 	code = code < 0 ? code : check_inputs(daq);
 	code = code < 0 ? code : check_output(daq);
 	code = code < 0 ? code : tactus_plan_metadata(plan, identity, NULL, device->metadata);
-	code = code < 0 ? code : tactus_bench_metadata(daq->bench, plan->modes, device->metadata);
+	code = code < 0 || waveforms ? code : tactus_bench_metadata(daq->bench, plan->modes, device->metadata);
 	device->modes = plan->modes;
-	device->has_detectors = true;
+	device->has_detectors = !waveforms;
 	device->has_force = device->has_temperature = device->has_reference = false;
 	device->expected_scans = tactus_live_expected(1 / plan->period_s, settings);
 	return code;
@@ -127,8 +134,7 @@ int tactus_daq_start(tactus_daq *daq, tactus_device *device, const char *identit
 
 /* ---- a scan ---- */
 
-/* Closes one switch and waits until what is behind it has settled; nothing where it is closed already. */
-static int select_sensor(tactus_daq *daq, const tactus_bench_sensor *sensor, enum tactus_mode mode)
+int tactus_daq_select(tactus_daq *daq, const tactus_bench_sensor *sensor, enum tactus_mode mode)
 {
 	const tactus_wiring *w = &daq->bench->wiring;
 	const uint32_t levels = tactus_wiring_levels(w, (int)(sensor - daq->bench->sensors), mode);
@@ -144,27 +150,41 @@ static int select_sensor(tactus_daq *daq, const tactus_bench_sensor *sensor, enu
 	return tactus_clock_wait(tactus_clock_ns() + (int64_t)llround(1e9 * daq->plan.settle_s));
 }
 
-static int take(tactus_daq *daq, const tactus_device *device, const tactus_bench_sensor *sensor, enum tactus_mode mode,
-				uint64_t sequence, tactus_reading *reading)
+tactus_reading tactus_daq_reading(const tactus_daq *daq, const tactus_bench_sensor *sensor, enum tactus_mode mode)
+{
+	tactus_reading reading = tactus_reading_empty();
+	reading.channel = sensor->channel;
+	reading.mode = mode;
+	reading.drive_V = mode == TACTUS_MODE_DC ? daq->plan.dc_drive_V : daq->plan.drive_V;
+	reading.frequency_Hz = mode == TACTUS_MODE_DC ? 0 : daq->plan.frequency_Hz;
+	return reading;
+}
+
+/* The values of a reading, of detectors or of a waveform. */
+static int read_values(tactus_daq *daq, enum tactus_mode mode, tactus_reading *reading)
 {
 	int inputs[TACTUS_DAQ_INPUTS];
 	double volts[TACTUS_DAQ_INPUTS];
 	bool clipped = false;
+	if (daq->operations->read_waveform != NULL)
+		return daq->operations->read_waveform(daq->context, mode, reading);
 	const size_t n = tactus_wiring_inputs(&daq->bench->wiring, mode, inputs);
-	int code = select_sensor(daq, sensor, mode);
+	const int code = daq->operations->read_inputs(daq->context, inputs, n, volts, &clipped);
+	if (code >= 0)
+		tactus_wiring_put(mode, volts, clipped, reading);
+	return code;
+}
+
+static int take(tactus_daq *daq, const tactus_device *device, const tactus_bench_sensor *sensor, enum tactus_mode mode,
+				uint64_t sequence, tactus_reading *reading)
+{
+	int code = tactus_daq_select(daq, sensor, mode);
 	const int64_t before_ns = tactus_clock_ns();
-	code = code < 0 ? code : daq->operations->read_inputs(daq->context, inputs, n, volts, &clipped);
-	if (code < 0)
-		return code;
-	*reading = tactus_reading_empty();
+	*reading = tactus_daq_reading(daq, sensor, mode);
+	code = code < 0 ? code : read_values(daq, mode, reading);
 	reading->time_s = tactus_live_at_s(&device->live, before_ns + (tactus_clock_ns() - before_ns) / 2);
 	reading->sequence = sequence;
-	reading->channel = sensor->channel;
-	reading->mode = mode;
-	reading->drive_V = mode == TACTUS_MODE_DC ? daq->plan.dc_drive_V : daq->plan.drive_V;
-	reading->frequency_Hz = mode == TACTUS_MODE_DC ? 0 : daq->plan.frequency_Hz;
-	tactus_wiring_put(mode, volts, clipped, reading);
-	return TACTUS_OK;
+	return code;
 }
 
 static int take_scan(tactus_daq *daq, const tactus_device *device, uint64_t sequence)

@@ -1,6 +1,6 @@
 /*
  * A scan of a bench through a data acquisition device (Paredes-Madrid 2010, fig. 7): select a source, close one switch,
- * settle, read the detectors, for every reading in turn. What the device can do are three operations; what hangs where
+ * settle, read the detectors, for every reading in turn. What the device can do are a few operations; what hangs where
  * is the bench's [wiring].
  */
 #ifndef TACTUS_DAQ_H
@@ -12,7 +12,7 @@
 /*
  * All of them may block for the device's time-out, and ask again by themselves where that is safe. They return 0;
  * TACTUS_ERR_LOST if the link is gone, TACTUS_ERR_INTERRUPTED if a signal came, any other error if the device did not
- * do it this time (counted in device->faults: the scan that it belongs to is a gap). None may be NULL.
+ * do it this time (counted in device->faults: the scan that it belongs to is a gap). None may be NULL but the last.
  */
 typedef struct {
 	/* Makes the masked digital lines (bit i: line i) outputs at these levels, all in one step. */
@@ -20,6 +20,12 @@ typedef struct {
 	int (*set_output)(void *context, int output, double volts);
 	/* Volts at n different inputs, one right after the other; *clipped if one of them is at the end of its range. */
 	int (*read_inputs)(void *context, const int *inputs, size_t n, double *volts, bool *clipped);
+	/*
+	 * In place of read_inputs where it is not NULL: a device that makes the reading itself, of waveforms, fills in
+	 * amplitude_V, phase_rad, quality, extras and the drive if it measures that. Checks and metadata of its inputs are
+	 * then its own.
+	 */
+	int (*read_waveform)(void *context, enum tactus_mode mode, tactus_reading *reading);
 } tactus_daq_operations;
 
 enum { TACTUS_DAQ_INPUTS = 2 }; /* of one reading: amplitude and phase */
@@ -35,6 +41,7 @@ typedef struct {
 	double output_minimum_V, output_maximum_V;
 	double input_maximum_V;
 	double switch_s, read_s; /* the least that one set_lines and one read_inputs take, for the check of the rate */
+	bool parallel;           /* every sensor has an input of its own: none is switched to, one read has them all */
 	/* the running scan */
 	tactus_plan plan;
 	tactus_reading readings[TACTUS_BENCH_SENSORS_MAX * 2]; /* one scan */
@@ -57,6 +64,11 @@ long tactus_daq_read(tactus_daq *daq, tactus_device *device, tactus_reading *rea
 int tactus_daq_safe(tactus_daq *daq);
 /* What `reopen` ends with: the source as the running scan has it. */
 int tactus_daq_resume(tactus_daq *daq);
+
+/* Closes one switch and waits until what is behind it has settled; nothing where it is closed already. */
+int tactus_daq_select(tactus_daq *daq, const tactus_bench_sensor *sensor, enum tactus_mode mode);
+/* A reading without values: channel, mode, and the drive and frequency of the plan. */
+tactus_reading tactus_daq_reading(const tactus_daq *daq, const tactus_bench_sensor *sensor, enum tactus_mode mode);
 
 /* Levels of all lines of the wiring with this sensor's switch closed (−1: all open) and this source selected. */
 uint32_t tactus_wiring_levels(const tactus_wiring *wiring, int sensor, enum tactus_mode mode);

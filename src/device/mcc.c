@@ -115,10 +115,39 @@ static int read_inputs(void *context, const int *inputs, size_t n, double *volts
 	return m->samples > 1 ? read_mean(m, inputs, n, volts, clipped) : read_single(m, inputs, n, volts, clipped);
 }
 
-static const tactus_daq_operations operations = {
+/* A burst, demodulated in pieces. */
+static int read_waveform(void *context, enum tactus_mode mode, tactus_reading *reading)
+{
+	tactus_mcc *m = context;
+	tactus_mcc_wave *wave = &m->waves[mode == TACTUS_MODE_AC];
+	tactus_mcc_scan scan = wave->scan;
+	uint64_t number;
+	scan.count = m->wave_ticks;
+	const int code = tactus_mcc_take_burst(m, &scan);
+	if (code < 0)
+		return code;
+	long count = 0;
+	for (size_t at = 0; at < scan.count && count >= 0; at += TACTUS_MCC_WAVE_TICKS) {
+		const size_t left = scan.count - at, n = left < TACTUS_MCC_WAVE_TICKS ? left : TACTUS_MCC_WAVE_TICKS;
+		count = tactus_mcc_wave_add(wave, m->burst + 2 * wave->width * at, n);
+	}
+	count = count < 0 ? count : tactus_mcc_wave_finish(wave);
+	if (count <= 0)
+		return count < 0 ? (int)count : tactus_fail(TACTUS_ERR_DEVICE, "a burst without a reading");
+	tactus_mcc_wave_get(wave, 0, 0, reading, &number);
+	return TACTUS_OK;
+}
+
+static const tactus_daq_operations of_detectors = {
 	.set_lines = set_lines,
 	.set_output = set_output,
 	.read_inputs = read_inputs,
+};
+static const tactus_daq_operations of_waveforms = {
+	.set_lines = set_lines,
+	.set_output = set_output,
+	.read_inputs = read_inputs,
+	.read_waveform = read_waveform,
 };
 
 /* ---- opening ---- */
@@ -127,6 +156,7 @@ static int parse_options(tactus_mcc *m, tactus_uri *uri)
 {
 	int code = tactus_uri_quantity(uri, "timeout", "s", &m->timeout_s);
 	code = code < 0 ? code : tactus_uri_integer(uri, "samples", 1, TACTUS_MCC_SAMPLES_MAX, &m->samples);
+	code = code < 0 ? code : tactus_uri_quantity(uri, "stream", "Hz", &m->stream_Hz);
 	const char *profile = tactus_uri_text(uri, "profile", NULL);
 	code = code < 0 ? code : tactus_uri_check(uri);
 	if (code >= 0 && profile != NULL)
@@ -159,7 +189,7 @@ static void describe(tactus_mcc *m)
 	const tactus_mcc_product *p = m->usb.product;
 	const bool has_outputs = p->outputs > 0;
 	m->daq = (tactus_daq){
-		.operations = &operations,
+		.operations = m->stream_Hz > 0 ? &of_waveforms : &of_detectors,
 		.context = m,
 		.name = p->name,
 		.bench = m->bench,
@@ -170,6 +200,7 @@ static void describe(tactus_mcc *m)
 			has_outputs ? TACTUS_MCC_OUTPUT_FULL_SCALE_V * TACTUS_MCC_OUTPUT_TOP / (TACTUS_MCC_OUTPUT_TOP + 1) : 0,
 		.input_maximum_V = 10,
 		.switch_s = REQUEST_s,
+		.parallel = m->stream_Hz > 0 && m->bench->wiring.waveform_count > 0,
 	};
 }
 
@@ -192,6 +223,9 @@ static int read_device(tactus_mcc *m)
 
 static void free_mcc(tactus_mcc *m)
 {
+	tactus_mcc_continuous_clear(&m->continuous);
+	for (size_t i = 0; i < TACTUS_COUNT(m->waves); i++)
+		tactus_mcc_wave_clear(&m->waves[i]);
 	tactus_mcc_usb_close(&m->usb);
 	tactus_bench_free(m->bench);
 	free(m->burst);
@@ -205,7 +239,6 @@ static int mcc_open(tactus_device *device, const char *address)
 	if (m == NULL)
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	m->timeout_s = TIMEOUT_s;
-	m->samples = 1;
 	m->usb.faults = &device->faults;
 	int code = tactus_uri_parse("usb", address, &uri);
 	if (code >= 0) {
@@ -256,7 +289,7 @@ static int estimate(tactus_mcc *m)
 {
 	tactus_mcc_scan scan = {0};
 	m->daq.read_s = REQUEST_s;
-	if (m->samples == 1)
+	if (m->samples <= 1)
 		return TACTUS_OK;
 	const int code = plan_burst(m, 0x03, &scan);
 	m->daq.read_s += (double)m->samples / scan.rate_Hz;
@@ -280,21 +313,112 @@ static void identify(const tactus_mcc *m, char text[64])
 		snprintf(text, 64, "MCC %s at USB port %s", m->usb.product->name, m->usb.port);
 }
 
+/* ---- scans of waveforms ---- */
+
+/* Ticks of a burst: as many as are asked for, or as the rate leaves time for. */
+static int size_burst(tactus_mcc *m)
+{
+	const tactus_plan *plan = &m->daq.plan;
+	const double each_s = plan->period_s / (double)(plan->channel_count * plan->mode_count);
+	const double left_s = each_s - plan->settle_s - m->daq.switch_s - m->daq.read_s;
+	const double ticks = m->samples > 0 ? (double)m->samples : floor(left_s * m->stream_Hz);
+	const bool ac = (plan->modes & TACTUS_MODE_AC) != 0;
+	const double least = fmax(3, ac ? ceil(2 * m->stream_Hz / plan->frequency_Hz) : 0);
+	if (ticks < least)
+		return tactus_fail(
+			TACTUS_ERR_ARGUMENT,
+			"%g samples for a reading are too few, %g are two periods of the drive: a lower rate, a shorter "
+			"settle time or more samples",
+			fmax(ticks, 0), least);
+	m->wave_ticks = (uint32_t)fmin(ticks, TACTUS_MCC_SAMPLES_MAX);
+	return TACTUS_OK;
+}
+
+static int make_bursts(tactus_mcc *m, tactus_device *device)
+{
+	const tactus_mcc_wave *wave = NULL;
+	int code = size_burst(m);
+	for (unsigned i = 0; i < 2 && code >= 0; i++) {
+		const enum tactus_mode mode = i == 0 ? TACTUS_MODE_DC : TACTUS_MODE_AC;
+		if ((m->daq.plan.modes & mode) == 0)
+			continue;
+		wave = &m->waves[i];
+		code = tactus_mcc_wave_make(&m->waves[i], m->usb.product, &m->scale, &m->daq, mode, m->stream_Hz, NAN);
+	}
+	return code < 0 ? code : tactus_mcc_wave_metadata(wave, device);
+}
+
+static int make_continuous(tactus_mcc *m, tactus_device *device)
+{
+	const int code = tactus_mcc_continuous_make(&m->continuous, &m->usb, &m->scale, &m->daq, m->stream_Hz);
+	if (code < 0)
+		return code;
+	tactus_metadata_set_number(device->metadata, "rate_Hz", 1 / m->continuous.period_s);
+	return tactus_mcc_wave_metadata(&m->continuous.wave, device);
+}
+
+/* One thing that nobody switches away is sampled without end; what is switched, in bursts. Nothing is written. */
+static int plan_waveforms(tactus_mcc *m, tactus_device *device, const char *identity,
+						  const tactus_scan_settings *settings)
+{
+	tactus_scan_settings unsettled = *settings;
+	unsettled.settle_s = 0;
+	m->daq.read_s = m->daq.switch_s = 0;
+	int code = tactus_daq_plan(&m->daq, device, identity, &unsettled);
+	m->unswitched = m->daq.parallel || m->daq.plan.channel_count * m->daq.plan.mode_count == 1;
+	if (code < 0 || m->unswitched)
+		return code < 0 ? code : make_continuous(m, device);
+	m->daq.switch_s = m->daq.read_s = REQUEST_s;
+	m->daq.read_s += (double)m->samples / m->stream_Hz;
+	code = tactus_daq_plan(&m->daq, device, identity, settings);
+	m->daq.read_s = 2 * REQUEST_s; /* to start a burst and to get its end */
+	return code < 0 ? code : make_bursts(m, device);
+}
+
+/* The one switch is closed, or none is needed, and the stream begins. */
+static int start_continuous(tactus_mcc *m, tactus_device *device, const tactus_scan_settings *settings)
+{
+	int code = tactus_daq_safe(&m->daq);
+	code = code < 0 ? code : tactus_daq_resume(&m->daq);
+	if (!m->daq.parallel)
+		code = code < 0 ? code : tactus_daq_select(&m->daq, m->daq.plan.scanned[0], m->continuous.wave.mode);
+	return code < 0 ? code : tactus_mcc_continuous_start(&m->continuous, device, settings);
+}
+
+/* ---- a scan ---- */
+
+/* All checks, before anything is written. */
+static int plan_scan(tactus_mcc *m, tactus_device *device, const char *identity, const tactus_scan_settings *settings)
+{
+	m->unswitched = false;
+	tactus_mcc_continuous_clear(&m->continuous);
+	if (m->stream_Hz > 0)
+		return plan_waveforms(m, device, identity, settings);
+	const int code = estimate(m);
+	return code < 0 ? code : tactus_daq_plan(&m->daq, device, identity, settings);
+}
+
+static int write_scan(tactus_mcc *m, tactus_device *device, const char *identity, const tactus_scan_settings *settings)
+{
+	const int code = set_ranges(m);
+	if (code < 0)
+		return code;
+	return m->unswitched ? start_continuous(m, device, settings)
+						 : tactus_daq_start(&m->daq, device, identity, settings);
+}
+
 static int mcc_start(tactus_device *device, const tactus_scan_settings *settings)
 {
 	tactus_mcc *m = device->state;
-	char identity[64];
+	char identity[64], message[512];
 	m->usb.timeout_ms = milliseconds(settings->timeout_s > 0 ? settings->timeout_s : m->timeout_s);
 	identify(m, identity);
-	int code = estimate(m);
-	code = code < 0 ? code : tactus_daq_plan(&m->daq, device, identity, settings);
+	int code = plan_scan(m, device, identity, settings);
 	code = code < 0 ? code : measure(m, device);
 	if (code < 0)
 		return code;
-	code = set_ranges(m);
-	code = code < 0 ? code : tactus_daq_start(&m->daq, device, identity, settings);
+	code = write_scan(m, device, identity, settings);
 	if (code < 0) { /* the message is of what went wrong */
-		char message[512];
 		snprintf(message, sizeof(message), "%s", tactus_error_message());
 		(void)tactus_daq_safe(&m->daq);
 		return tactus_fail(code, "%s", message);
@@ -305,23 +429,33 @@ static int mcc_start(tactus_device *device, const tactus_scan_settings *settings
 static long mcc_read(tactus_device *device, tactus_reading *readings, size_t max)
 {
 	tactus_mcc *m = device->state;
-	return tactus_daq_read(&m->daq, device, readings, max);
+	return m->unswitched ? tactus_mcc_continuous_read(&m->continuous, device, readings, max)
+						 : tactus_daq_read(&m->daq, device, readings, max);
 }
 
 static int mcc_stop(tactus_device *device)
 {
 	tactus_mcc *m = device->state;
-	return tactus_daq_safe(&m->daq);
+	tactus_mcc_continuous_halt(&m->continuous);
+	const int first = m->unswitched ? tactus_mcc_reset_scan(&m->usb) : TACTUS_OK;
+	const int second = tactus_daq_safe(&m->daq);
+	return first < 0 ? first : second;
 }
 
 static int mcc_reopen(tactus_device *device)
 {
 	tactus_mcc *m = device->state;
+	tactus_mcc_continuous_halt(&m->continuous);
 	int code = tactus_mcc_usb_reopen(&m->usb);
 	code = code < 0 ? code : read_device(m);
 	code = code < 0 ? code : set_ranges(m);
 	code = code < 0 ? code : tactus_daq_safe(&m->daq);
-	return code < 0 ? code : tactus_daq_resume(&m->daq);
+	code = code < 0 ? code : tactus_daq_resume(&m->daq);
+	if (code < 0 || !m->unswitched)
+		return code;
+	if (!m->daq.parallel)
+		code = tactus_daq_select(&m->daq, m->daq.plan.scanned[0], m->continuous.wave.mode);
+	return code < 0 ? code : tactus_mcc_continuous_resume(&m->continuous, device);
 }
 
 const tactus_backend tactus_backend_usb = {

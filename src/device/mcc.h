@@ -3,7 +3,8 @@
 #define TACTUS_MCC_H
 
 #include "device/daq.h"
-#include "device/mcc_usb.h"
+#include "device/mcc_continuous.h"
+#include "device/mcc_wave.h"
 #include "device/uri.h"
 
 enum { TACTUS_MCC_SAMPLES_MAX = 1 << 20 };
@@ -16,9 +17,15 @@ typedef struct {
 	/* inputs */
 	unsigned range;
 	tactus_mcc_scale scale;
-	long samples; /* of each input for one reading; 1: a single conversion */
+	long samples; /* of each input for one reading; 0: as many as suit */
 	uint8_t *burst;
 	size_t burst_size;
+	/* waveforms; stream_Hz 0: none, there are detectors */
+	double stream_Hz;
+	tactus_mcc_wave waves[2]; /* bursts in DC and AC */
+	uint32_t wave_ticks;      /* of a burst */
+	bool unswitched;          /* one stream without end in place of bursts */
+	tactus_mcc_continuous continuous;
 	/* the digital lines as they were last written; tristate: 1 is an input */
 	uint8_t latch, tristate;
 } tactus_mcc;

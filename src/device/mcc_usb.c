@@ -102,18 +102,17 @@ int tactus_mcc_reset_scan(tactus_mcc_usb *usb)
 	return code < 0 ? code : tactus_mcc_put(usb, TACTUS_MCC_STATUS, 0, 0, NULL, 0);
 }
 
-/* Why bulk data stopped coming: -1 nothing is wrong, or an error. */
-static int why(tactus_mcc_usb *usb, int error)
+int tactus_mcc_why(tactus_mcc_usb *usb, bool silent)
 {
 	uint8_t status[2];
-	int code = tactus_mcc_get(usb, TACTUS_MCC_STATUS, 0, 0, status, sizeof(status));
+	const int code = tactus_mcc_get(usb, TACTUS_MCC_STATUS, 0, 0, status, sizeof(status));
 	if (code < 0)
 		return code;
 	if ((tactus_mcc_u16(status) & TACTUS_MCC_STATUS_OVERRUN) != 0) {
 		usb->faults->overruns++;
 		return tactus_fail(TACTUS_ERR_DEVICE, "%s: its buffer was full", usb->product->name);
 	}
-	return tactus_mcc_fail(usb, error, "a scan");
+	return tactus_mcc_fail(usb, silent ? LIBUSB_ERROR_TIMEOUT : LIBUSB_ERROR_PIPE, "a scan");
 }
 
 int tactus_mcc_read_scan(tactus_mcc_usb *usb, uint8_t *bytes, size_t n, unsigned timeout_ms)
@@ -127,7 +126,7 @@ int tactus_mcc_read_scan(tactus_mcc_usb *usb, uint8_t *bytes, size_t n, unsigned
 		return TACTUS_OK; /* without its empty packet it is complete all the same */
 	int code;
 	if (error == LIBUSB_ERROR_PIPE || error == LIBUSB_ERROR_TIMEOUT)
-		code = why(usb, error);
+		code = tactus_mcc_why(usb, error == LIBUSB_ERROR_TIMEOUT);
 	else if (error < 0)
 		code = tactus_mcc_fail(usb, error, "a scan");
 	else {

@@ -48,6 +48,8 @@ int tactus_mcc_reset_scan(tactus_mcc_usb *usb);
  * rounded up to a whole packet, and one packet more. TACTUS_ERR_DEVICE as above, overrun included.
  */
 int tactus_mcc_read_scan(tactus_mcc_usb *usb, uint8_t *bytes, size_t n, unsigned timeout_ms);
+/* Why a scan's data stopped coming, asked of the device: an overrun, a stall, silence; counted. LOST or DEVICE. */
+int tactus_mcc_why(tactus_mcc_usb *usb, bool silent);
 /* What a libusb error means, counted and said; `doing`: "request 0x10". */
 int tactus_mcc_fail(tactus_mcc_usb *usb, int error, const char *doing);
 
