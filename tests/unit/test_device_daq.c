@@ -55,7 +55,8 @@ static int read_inputs(void *context, const int *inputs, size_t n, double *volts
 	return TACTUS_OK;
 }
 
-static const tactus_daq_operations operations = {set_lines, set_output, read_inputs};
+static const tactus_daq_operations operations = {
+	.set_lines = set_lines, .set_output = set_output, .read_inputs = read_inputs};
 
 /* Two sensors: lines 4 and 5 close their switches (active low where asked), line 8 selects AC, input 2 is DC. */
 static const char wiring[] = "[wiring]\nswitch_lines = [4, 5]\nsource_line = 8\ndc_output = 0\ndc_output_gain = -1\n"
