@@ -2,8 +2,11 @@
 # The program itself: help, version, unknown words, man pages, completion.
 load common
 
-@test "the ten commands are listed" {
-	[ "$(commands | tr '\n' ' ')" = "devices scan convert fit force simulate diagnose show join emulate " ]
+@test "every command is listed, once, and those that scripts know stay" {
+	[ "$(commands | sort)" = "$(basename -a "$root"/cli/cmd_*.c | sed 's/^cmd_\(.*\)\.c$/\1/' | sort)" ]
+	for c in devices scan convert fit force simulate diagnose show join emulate; do
+		commands | grep -qx "$c" || fail "$c is not listed"
+	done
 }
 
 @test "--version prints the version of the header" {
