@@ -2,9 +2,11 @@
 #include "core/toml.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -142,11 +144,15 @@ int tactus_toml_read(const char *path, tactus_toml **document)
 		if (std::string(path) == "-") {
 			text.assign(std::istreambuf_iterator<char>(std::cin), {});
 		} else {
+			errno = 0;
 			std::ifstream file(path, std::ios::binary);
 			if (file)
 				text.assign(std::istreambuf_iterator<char>(file), {});
+			if (!file && errno == ENOENT)
+				return tactus_fail(TACTUS_ERR_INPUT, "%s: there is no such file", path);
 			if (!file)
-				return tactus_fail(TACTUS_ERR_INPUT, "%s: cannot be read", path);
+				return tactus_fail(TACTUS_ERR_INPUT, "%s: cannot be read%s%s", path, errno ? ": " : "",
+								   errno ? std::strerror(errno) : "");
 		}
 		return parse(path, text, document);
 	} catch (const std::exception &error) {

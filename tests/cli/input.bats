@@ -197,7 +197,7 @@ bad() {
 	for c in force simulate "scan sim:"; do
 		run --separate-stderr tactus $c -m nosuch.toml
 		status_is 3
-		says nosuch.toml
+		says "nosuch.toml: there is no such file"
 		run --separate-stderr tactus $c -m odd.toml
 		status_is 3
 		says odd.toml:4:1
