@@ -11,8 +11,8 @@ extern const struct cli_command cli_devices, cli_scan, cli_convert, cli_fit, cli
 	cli_join, cli_diagnose, cli_emulate;
 
 const struct cli_command *const cli_commands[] = {
-	&cli_devices,  &cli_scan,     &cli_convert, &cli_fit,  &cli_force,
-	&cli_simulate, &cli_diagnose, &cli_show,    &cli_join, &cli_emulate, NULL,
+	&cli_devices,  &cli_scan, &cli_convert, &cli_fit,     &cli_force, &cli_simulate,
+	&cli_diagnose, &cli_show, &cli_join,    &cli_emulate, NULL,
 };
 
 const struct cli_command *cli_find_command(const char *name)
