@@ -14,6 +14,7 @@
 
 #include <tactus/device.h>
 #include <tactus/diagnose.h>
+#include <tactus/drive.h>
 #include <tactus/emulate.h>
 #include <tactus/error.h>
 #include <tactus/fit.h>
