@@ -46,8 +46,8 @@ typedef struct {
 	double torque_Nm; /**< what was written: the torque that was asked for, limited and rounded to the command's step */
 	uint64_t reports; /**< position reports since the start: the drive sends one when the position changed, at most
 						   1000 a second */
-	bool fresh;       /**< the position came since the last step */
-	bool limited;     /**< the torque was cut to the limit */
+	bool fresh; /**< the position came since the last step, and not after so long a pause (63 reports) that it is old */
+	bool limited;            /**< the torque was cut to the limit */
 	bool out_of_range;       /**< the position is at the end of what the drive can say */
 	uint64_t watchdog_bites; /**< how often a step came so late that the drive had let go of the motor meanwhile */
 } tactus_drive_state;

@@ -54,6 +54,8 @@ enum {
 };
 enum { CONTROL_ENABLE = 0x01, CONTROL_DISABLE = 0x02, CONTROL_RESET = 0x08, EFFECT_START = 1, EFFECT_STOP = 3 };
 enum { MAGNITUDE_MAX = 0x7FFF, BLOCKS_MAX = 40, REPORT_MAX = 64, EFFECT_MAX = 32, DRAIN_MAX = 1024 };
+/* Linux keeps so many reports for a reader; when they are not taken it drops the newest. */
+enum { QUEUE_MAX = 63 };
 /* The angle whose sine is -1: torque = -magnitude * sin(direction), so that positive turns the axis up. */
 enum { DIRECTION_UP = 27000 };
 /* Unchanged positions are sent every 0.1 s. */
@@ -602,15 +604,16 @@ static int feed(tactus_drive *drive, board *b)
 	return write_operation(b, EFFECT_START);
 }
 
-/* Takes all reports that came; the newest counts. */
+/* Takes all reports that came; the newest counts. If the queue was full, that is an old one. */
 static int newest_position(tactus_drive *drive, board *b)
 {
 	uint8_t report[REPORT_MAX];
 	int32_t value;
-	int n = 1;
+	int n = 1, taken = 0;
 	drive->now.fresh = false;
-	for (int i = 0; i < DRAIN_MAX && n > 0; i++) {
+	while (taken < DRAIN_MAX && n > 0) {
 		n = tactus_hid_read(&b->hid, report, sizeof(report), 0);
+		taken += n > 0;
 		if (n <= 0 || !tactus_hid_get(&b->position, report, (size_t)n, &value))
 			continue;
 		b->reported_ns = drive->clock_ns();
@@ -618,7 +621,7 @@ static int newest_position(tactus_drive *drive, board *b)
 		drive->now.out_of_range = value >= b->position.logical_maximum || value <= -b->position.logical_maximum;
 		drive->now.time_s = (double)(b->reported_ns - drive->started_ns) * 1e-9;
 		drive->now.reports++;
-		drive->now.fresh = true;
+		drive->now.fresh = taken < QUEUE_MAX;
 	}
 	return n;
 }

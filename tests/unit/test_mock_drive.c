@@ -653,6 +653,26 @@ static void the_newest_position_counts(void **state)
 	board_free(b);
 }
 
+static void after_a_pause_that_filled_the_queue_the_position_is_not_fresh(void **state)
+{
+	board *b = board_new(state, &ffboard);
+	tactus_drive *drive = start_drive();
+	tactus_drive_state now;
+	for (int16_t i = 0; i < 62; i++)
+		controller(b->mock, i);
+	assert_int_equal(tactus_drive_step(drive, 0, &now), 0);
+	assert_true(now.fresh && now.reports == 62);
+	for (int16_t i = 0; i < 63; i++)
+		controller(b->mock, i);
+	assert_int_equal(tactus_drive_step(drive, 0, &now), 0);
+	assert_true(!now.fresh && now.reports == 125);
+	controller(b->mock, 63);
+	assert_int_equal(tactus_drive_step(drive, 0, &now), 0);
+	assert_true(now.fresh);
+	tactus_drive_close(drive);
+	board_free(b);
+}
+
 static void a_position_of_32_bits_is_understood(void **state)
 {
 	mock_device device = ffboard;
@@ -771,6 +791,7 @@ int main(void)
 		TEST(torques_become_magnitudes_within_the_limit),
 		TEST(a_torque_that_is_no_number_switches_the_motor_off),
 		TEST(the_newest_position_counts),
+		TEST(after_a_pause_that_filled_the_queue_the_position_is_not_fresh),
 		TEST(a_position_of_32_bits_is_understood),
 		TEST(the_boards_watchdog_is_fed_and_a_late_step_is_told),
 		TEST(a_board_that_falls_silent_is_lost_and_switched_off),
