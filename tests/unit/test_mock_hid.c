@@ -355,6 +355,20 @@ static void unplugged_it_is_lost_and_found_again_under_another_name(void **state
 	}
 }
 
+static void a_hang_up_of_the_node_is_a_loss(void **state)
+{
+	mock_hid *mock = mock_new(*state, &dymo);
+	tactus_device *device = start("hid:scale", NULL);
+	tactus_reading reading;
+	const int nothing = open("/dev/null", O_RDWR | O_CLOEXEC);
+	assert_true(nothing >= 0 && dup2(nothing, mock->master) >= 0);
+	close(nothing);
+	assert_int_equal(tactus_device_read(device, &reading, 1), TACTUS_ERR_LOST);
+	assert_non_null(strstr(tactus_error_message(), "the device is gone"));
+	tactus_device_close(device);
+	mock_free(mock);
+}
+
 static void a_scan_starts_anew_after_the_scale_was_lost(void **state)
 {
 	mock_hid *mock = mock_new(*state, &dymo);
@@ -437,6 +451,7 @@ int main(void)
 		TEST(a_silent_scale_is_asked_and_is_lost_if_it_does_not_answer),
 		TEST(a_scan_ends_with_its_duration_though_the_scale_is_silent),
 		TEST(unplugged_it_is_lost_and_found_again_under_another_name),
+		TEST(a_hang_up_of_the_node_is_a_loss),
 		TEST(a_scan_starts_anew_after_the_scale_was_lost),
 		TEST(settings_that_a_scale_does_not_have_are_refused),
 	};
