@@ -403,27 +403,47 @@ static int refuse_settings(const serial *s, const tactus_scan_settings *settings
 	return TACTUS_OK;
 }
 
+/* What of a line can be shown to a person. */
+static void quote(const char *line, size_t length, char *text, size_t size)
+{
+	size_t n = 0;
+	for (size_t i = 0; i < length && n + 1 < size; i++)
+		if (line[i] >= ' ' && line[i] <= '~')
+			text[n++] = line[i];
+	text[n] = '\0';
+}
+
+static int fail_no_line(const serial *s, const char *last)
+{
+	return tactus_fail(TACTUS_ERR_DEVICE, "%s: no line of %zu numbers came within %d s at %d baud%s%s%s", s->port.path,
+					   s->lines.count, FIRST_LINE_S, s->baud, last[0] != '\0' ? "; the last one was \"" : "", last,
+					   last[0] != '\0' ? "\"" : "");
+}
+
 /* Watches lines for a while: that there are some, of so many numbers, and how regularly they come. */
 static int warm_up(serial *s, tactus_device *device)
 {
 	const int64_t began_ns = tactus_clock_ns();
+	const int64_t until_ns = began_ns + (int64_t)(1e9 * FIRST_LINE_S);
 	double values[TACTUS_LINE_FIELDS_MAX];
+	char last[64] = "";
 	int64_t before_ns = 0, now_ns = began_ns;
 	for (size_t n = 0; n < WARM_LINES && (n < 2 || now_ns - began_ns < (int64_t)(1e9 * WARM_S));) {
 		size_t length;
-		const int code = next_line(s, began_ns + (int64_t)(1e9 * FIRST_LINE_S), &length);
+		const int code = now_ns < until_ns ? next_line(s, until_ns, &length) : 0;
 		if (code < 0)
 			return code;
 		if (code == 0 && n > 0)
 			break;
 		if (code == 0)
-			return tactus_fail(TACTUS_ERR_DEVICE, "%s: no line of %zu numbers came within %d s at %d baud",
-							   s->port.path, s->lines.count, FIRST_LINE_S, s->baud);
+			return fail_no_line(s, last);
 		now_ns = tactus_clock_ns();
 		if (tactus_lines_read(&s->lines, s->buffer, length, values)) {
 			if (n++ > 0)
 				tactus_timing_add(&device->intervals, 1e-9 * (double)(now_ns - before_ns));
 			before_ns = now_ns;
+		} else {
+			quote(s->buffer, length, last, sizeof(last));
 		}
 		drop_line(s, length);
 	}

@@ -49,6 +49,29 @@ setup_file() {
 	[ "$(column force_estimate_N <live.csv | grep -c .)" -eq 10 ]
 }
 
+@test "a second board is the reference: its force stands beside every reading, on one clock" {
+	export REAL_CLOCK=1 # fifty lines a second from each: what comes at once has no time between
+	plug
+	first=$port other=$board
+	plug
+	tactus scan "serial:$first?columns=-,-,-,conductance_S@2/1e6" --reference "serial:$port?columns=-,-,force_N/20,-" \
+		--count 40 -o run.csv
+	kill "$other"
+	[ "$(metadata device <run.csv)" = "$first" ]
+	[ "$(metadata reference_device <run.csv)" = "$port" ]
+	for key in device_jitter_s reference_jitter_s reference_rate_Hz; do
+		metadata $key <run.csv | awk '!($1 > 0) { exit 1 }'
+	done
+	[ "$(column force_N <run.csv | awk '/./ && $1 >= 0 && $1 < 20.6' | wc -l)" -eq 40 ]
+	[ "$(column quality <run.csv | sort -u)" = ok ]
+	run --separate-stderr tactus scan "serial:$port?columns=force_N,-"
+	status_is 4 && says 'line of 2 numbers' && says 'the last one was "'
+	run --separate-stderr tactus scan sim: --reference "serial:$port"
+	status_is 1 && says 'does not run by the clock'
+	run --separate-stderr tactus scan "serial:$port?columns=-,-,force_N/20,-" --reference "serial:/dev/no-such-port"
+	status_is 4 && says /dev/no-such-port
+}
+
 @test "a board that is unplugged and comes back goes on in the same file" {
 	plug
 	ln -s "$port" tty
