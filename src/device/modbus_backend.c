@@ -13,7 +13,10 @@ enum { BASES_MAX = 8 };
 static const struct {
 	const char *driver;
 	const tactus_backend *backend;
-} drivers[] = {{"registers", &tactus_modbus_registers}, {"robotiq", &tactus_modbus_robotiq}};
+} drivers[] = {{"registers", &tactus_modbus_registers},
+			   {"robotiq", &tactus_modbus_robotiq},
+			   {"labjack-t7", &tactus_modbus_labjack},
+			   {"labjack-t4", &tactus_modbus_labjack}};
 
 int tactus_profile_find(const char *name, const char **text)
 {
