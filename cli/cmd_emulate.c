@@ -78,8 +78,8 @@ const struct cli_command cli_emulate = {
 		"runs faster than the wall's, and settle times and rates that are asked for have to be scaled along.\n\n"
 		"Emulated devices were written from the same public documents as the drivers, and no real device was there to "
 		"compare: they show that the two agree, not that either is right.",
-	.examples = "tactus emulate labjack-t7 --listen :502                # for any Modbus client\n"
-				"tactus emulate labjack-t7 --protocol 'hold 100N 1h'   # under a load of your own\n"
+	.examples = "tactus emulate labjack-t7 --listen 0.0.0.0:5020          # for any Modbus client\n"
+				"tactus emulate labjack-t7 ati-net-ft --speed 10       # with a reference beside it\n"
 				"tactus emulate labjack-t4 --bench my.toml --lose 5%   # with lost scans\n",
 	.options = options,
 	.arguments_max = 8,

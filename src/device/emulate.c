@@ -18,7 +18,9 @@
 
 enum { DEVICES_MAX = 8 };
 
-static const tactus_emulated *const devices[] = {&tactus_emulated_labjack_t7, &tactus_emulated_labjack_t4};
+static const tactus_emulated *const devices[] = {&tactus_emulated_labjack_t7, &tactus_emulated_labjack_t4,
+												 &tactus_emulated_board_tcp, &tactus_emulated_board_rtu,
+												 &tactus_emulated_ati_net_ft};
 
 struct tactus_emulator {
 	tactus_emulation world;
@@ -57,7 +59,8 @@ static int listen_at(const struct addrinfo *info, int *port)
 	if (fd < 0)
 		return -1;
 	(void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
-	if (bind(fd, info->ai_addr, info->ai_addrlen) == 0 && listen(fd, TACTUS_EMULATE_CLIENTS) == 0 &&
+	if (bind(fd, info->ai_addr, info->ai_addrlen) == 0 &&
+		(info->ai_socktype == SOCK_DGRAM || listen(fd, TACTUS_EMULATE_CLIENTS) == 0) &&
 		getsockname(fd, (struct sockaddr *)&address, &size) == 0 &&
 		getnameinfo((struct sockaddr *)&address, size, NULL, 0, service, sizeof(service), NI_NUMERICSERV) == 0) {
 		*port = (int)strtol(service, NULL, 10);
@@ -69,9 +72,9 @@ static int listen_at(const struct addrinfo *info, int *port)
 	return -1;
 }
 
-int tactus_emulation_listen(const char *host, int *port)
+static int listen_for(int type, const char *host, int *port)
 {
-	const struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV};
+	const struct addrinfo hints = {.ai_socktype = type, .ai_flags = AI_PASSIVE | AI_NUMERICSERV};
 	struct addrinfo *list = NULL;
 	char service[8];
 	snprintf(service, sizeof(service), "%d", *port);
@@ -83,6 +86,16 @@ int tactus_emulation_listen(const char *host, int *port)
 		(void)tactus_fail(TACTUS_ERR_DEVICE, "cannot listen at %s port %s: %s", host, service, strerror(errno));
 	freeaddrinfo(list);
 	return fd < 0 ? TACTUS_ERR_DEVICE : fd;
+}
+
+int tactus_emulation_listen(const char *host, int *port)
+{
+	return listen_for(SOCK_STREAM, host, port);
+}
+
+int tactus_emulation_bind(const char *host, int *port)
+{
+	return listen_for(SOCK_DGRAM, host, port);
 }
 
 int tactus_emulation_accept(tactus_emulation *world, int listener)
@@ -124,23 +137,25 @@ static int find(const char *profile, const tactus_emulated **device)
 	return tactus_fail(TACTUS_ERR_DEVICE, "no device '%s' is emulated; there are %s", profile, names);
 }
 
-/* "HOST:PORT" → its parts; port 0 is a free one. */
+/* "HOST:PORT", "[::1]:PORT" or "HOST" → its parts; port 0 is a free one. */
 static int parse_listen(const char *listen, char *host, size_t size, int *port)
 {
-	const char *text = listen != NULL ? listen : "127.0.0.1:0", *colon = strrchr(text, ':');
-	const size_t brackets = text[0] == '[' ? 1 : 0;
-	char *rest;
-	*port = 0;
-	if (colon != NULL && colon[1] != '\0' && strchr(colon, ']') == NULL) {
-		const long number = strtol(colon + 1, &rest, 10);
-		if (*rest != '\0' || number < 0 || number > 65535)
-			return tactus_fail(TACTUS_ERR_ARGUMENT, "'%s': a port is a number from 0 (a free one) to 65535", text);
-		*port = (int)number;
+	const char *text = listen != NULL ? listen : "127.0.0.1", *begin = text, *end = strchr(text, ':');
+	if (*text == '[') { /* an IPv6 address has colons of its own */
+		begin = text + 1;
+		end = strchr(begin, ']');
 	}
-	const size_t length = (colon != NULL ? (size_t)(colon - text) : strlen(text));
-	if (length <= 2 * brackets || length - 2 * brackets >= size)
+	end = end != NULL ? end : text + strlen(text);
+	const char *rest = *end == ']' ? end + 1 : end;
+	char *after = NULL;
+	const long number = *rest == ':' ? strtol(rest + 1, &after, 10) : 0;
+	if (end == begin || (size_t)(end - begin) >= size || (*rest != '\0' && *rest != ':'))
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "'%s' is not of the form HOST:PORT", text);
-	snprintf(host, size, "%.*s", (int)(length - 2 * brackets), text + brackets);
+	if (number < 0 || number > 65535 || (after != NULL && (*after != '\0' || after == rest + 1)))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "'%s': a port is a number from 0 (a free one) to 65535", text);
+	memcpy(host, begin, (size_t)(end - begin));
+	host[end - begin] = '\0';
+	*port = (int)number;
 	return TACTUS_OK;
 }
 
@@ -155,10 +170,11 @@ static int check(const tactus_emulator_settings *settings, size_t count)
 	return TACTUS_OK;
 }
 
-static int open_world(tactus_emulation *world, const char *profile, const tactus_emulator_settings *settings)
+static int open_world(tactus_emulation *world, const tactus_emulated *device, const tactus_emulator_settings *settings)
 {
+	const char *own = device->bench != NULL ? device->bench : device->profile;
 	world->settings = *settings;
-	const int code = tactus_instrument_open(settings->bench != NULL ? settings->bench : profile, settings->protocol,
+	const int code = tactus_instrument_open(settings->bench != NULL ? settings->bench : own, settings->protocol,
 											settings->seed, &world->instrument);
 	if (code >= 0)
 		world->bench = tactus_instrument_bench(world->instrument);
@@ -169,7 +185,7 @@ int tactus_emulator_new(const char *const *profiles, size_t count, const tactus_
 						tactus_emulator **result)
 {
 	char host[256];
-	int port, code = check(settings, count);
+	int port = 0, code = check(settings, count);
 	code = code < 0 ? code : parse_listen(settings->listen, host, sizeof(host), &port);
 	if (code < 0)
 		return code;
@@ -178,7 +194,7 @@ int tactus_emulator_new(const char *const *profiles, size_t count, const tactus_
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	for (size_t i = 0; i < count && code >= 0; i++)
 		code = find(profiles[i], &emulator->items[i].device);
-	code = code < 0 ? code : open_world(&emulator->world, profiles[0], settings);
+	code = code < 0 ? code : open_world(&emulator->world, emulator->items[0].device, settings);
 	for (size_t i = 0; i < count && code >= 0; i++) {
 		code = emulator->items[i].device->open(&emulator->world, host, i == 0 ? port : 0, emulator->items[i].uri,
 											   &emulator->items[i].state);

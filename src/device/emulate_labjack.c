@@ -219,9 +219,10 @@ static void get_value(emulated_labjack *lj, int address, uint16_t *registers)
 			registers);
 }
 
-static int read_registers(void *context, int address, size_t n, uint16_t *registers)
+static int read_registers(void *context, int function, int address, size_t n, uint16_t *registers)
 {
 	emulated_labjack *lj = context;
+	(void)function; /* they are the same to it */
 	const int exception = check_span(lj, address, n, READ);
 	if (exception != 0)
 		return exception;

@@ -1,7 +1,9 @@
 /* A Modbus server for emulated devices: libmodbus does the framing, the device says what its registers do. */
 #include <errno.h>
+#include <pty.h>
 #include <stdlib.h>
 #include <string.h>
+#include <termios.h>
 #include <unistd.h>
 
 #include "core/core.h"
@@ -42,8 +44,33 @@ int tactus_modbus_server_open_tcp(tactus_modbus_server *server, const char *host
 	return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 }
 
+int tactus_modbus_server_open_rtu(tactus_modbus_server *server, int unit, char *path, size_t size)
+{
+	int ours = -1, theirs = -1;
+	struct termios raw;
+	if (openpty(&ours, &theirs, NULL, NULL, NULL) < 0 || ttyname_r(theirs, path, size) != 0 ||
+		tcgetattr(theirs, &raw) < 0)
+		return tactus_fail(TACTUS_ERR_DEVICE, "no pseudo-terminal can be had: %s", strerror(errno));
+	cfmakeraw(&raw);
+	(void)tcsetattr(theirs, TCSANOW, &raw);
+	server->listener = -1;
+	server->line = theirs;
+	server->clients[server->client_count++] = ours;
+	server->modbus = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1); /* for its framing alone */
+	server->mapping = new_mapping();
+	if (server->modbus != NULL && server->mapping != NULL && modbus_set_slave(server->modbus, unit) == 0) {
+		modbus_set_indication_timeout(server->modbus, 0, 500000);
+		return TACTUS_OK;
+	}
+	tactus_modbus_server_close(server);
+	return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+}
+
 void tactus_modbus_server_close(tactus_modbus_server *server)
 {
+	if (server->line > 0)
+		close(server->line);
+	server->line = 0;
 	for (size_t i = 0; i < server->client_count; i++)
 		close(server->clients[i]);
 	if (server->listener >= 0)
@@ -81,7 +108,7 @@ static int handle(const tactus_modbus_server *server, const uint8_t *pdu, int le
 	if (n == 0 || address + (int)n > REGISTERS)
 		return 0;
 	if ((function == READ_HOLDING || function == READ_INPUT) && n <= MODBUS_MAX_READ_REGISTERS)
-		return server->registers->read(server->context, address, n, server->mapping->tab_registers + address);
+		return server->registers->read(server->context, function, address, n, server->mapping->tab_registers + address);
 	if (function == WRITE_ONE)
 		values[0] = word(pdu + 3);
 	else if (function != WRITE_MANY || n > WRITE_MAX || length < 6 + 2 * (int)n || pdu[5] != 2 * n)
@@ -97,10 +124,13 @@ static bool serve_client(tactus_modbus_server *server, int fd)
 	uint8_t query[MODBUS_MAX_ADU_LENGTH];
 	modbus_set_socket(server->modbus, fd);
 	const int length = modbus_receive(server->modbus, query), header = modbus_get_header_length(server->modbus);
+	if (length < 0 && server->line > 0)
+		modbus_flush(server->modbus); /* noise on the line: whoever sent it asks again */
 	if (length < 0)
-		return errno == EINTR;
+		return errno == EINTR || server->line > 0;
 	if (length < header + 5)
 		return length == 0;
+	tactus_emulation_begin(server->world);
 	const int exception = handle(server, query + header, length - header);
 	const int sent = exception != 0 ? modbus_reply_exception(server->modbus, query, (unsigned)exception)
 									: modbus_reply(server->modbus, query, length, server->mapping);

@@ -31,6 +31,8 @@ const tactus_bench *tactus_instrument_bench(const tactus_instrument *instrument)
  */
 void tactus_instrument_select(tactus_instrument *instrument, double time_s, uint64_t closed, enum tactus_mode mode,
 							  double dc_drive_V);
+/* Another AC source than the bench's, from the next reading on. */
+void tactus_instrument_set_source(tactus_instrument *instrument, double drive_V, double frequency_Hz);
 /* What the detectors show in a window that begins at that instant, or when the window before is over. */
 int tactus_instrument_read(tactus_instrument *instrument, double time_s, tactus_instrument_volts *volts);
 /* Volts with the converter's noise, as one of its codes, with `gain` in front of it; *clipped at its ends. */

@@ -424,6 +424,8 @@ static int add_slot(labjack *lj, size_t slot)
 		const double begin_s = slot_s(lj, s->slots.number - 1) - 1 / s->rate_Hz; /* when its lines were set */
 		s->sequence = tactus_live_number(&lj->device->live, begin_s);
 		s->over = is_over(lj, begin_s);
+		if (s->over)
+			return 0;
 	} else if (slot != s->built) {
 		s->built = SIZE_MAX; /* one of it is missing: nothing fits until the next scan begins */
 		return 0;

@@ -20,6 +20,7 @@ struct tactus_instrument {
 	uint64_t closed;
 	enum tactus_mode mode;
 	double dc_drive_V, since_s, free_s;
+	double drive_V, frequency_Hz;      /* of the AC source */
 	uint64_t references, temperatures; /* numbers of the readings of those instruments */
 	/* one reading */
 	sim_block block;
@@ -80,6 +81,8 @@ int tactus_instrument_open(const char *bench, const char *protocol, uint64_t see
 	if (code >= 0) {
 		t->seed = seed != 0 ? seed : (uint64_t)t->bench->seed;
 		t->mode = TACTUS_MODE_DC;
+		t->drive_V = t->bench->scan.drive_V;
+		t->frequency_Hz = t->bench->scan.frequency_Hz;
 		make_block(t);
 		code = start(t, protocol);
 	}
@@ -124,6 +127,12 @@ void tactus_instrument_select(tactus_instrument *t, double time_s, uint64_t clos
 	t->since_s = fmax(time_s, t->free_s);
 }
 
+void tactus_instrument_set_source(tactus_instrument *t, double drive_V, double frequency_Hz)
+{
+	t->drive_V = drive_V;
+	t->frequency_Hz = frequency_Hz;
+}
+
 /* Conductance and capacitance of all films whose switches are closed; the first of them, or SIM_NO_SENSOR. */
 static int connect(tactus_instrument *t, size_t *first)
 {
@@ -150,7 +159,7 @@ static int connect(tactus_instrument *t, size_t *first)
 int tactus_instrument_read(tactus_instrument *t, double time_s, tactus_instrument_volts *volts)
 {
 	const bool dc = t->mode == TACTUS_MODE_DC;
-	const double frequency_Hz = dc ? 0 : t->bench->scan.frequency_Hz, window_s = sim_window_s(t->bench, frequency_Hz);
+	const double frequency_Hz = dc ? 0 : t->frequency_Hz, window_s = sim_window_s(t->bench, frequency_Hz);
 	const double begin_s = fmax(time_s, t->free_s), at_s = begin_s + window_s / 2;
 	double mean_V[SIM_FILTERS];
 	size_t first;
@@ -160,7 +169,7 @@ int tactus_instrument_read(tactus_instrument *t, double time_s, tactus_instrumen
 	t->reading.frequency_Hz = frequency_Hz;
 	t->block.time_s[0] = at_s;
 	t->block.frequency_Hz[0] = frequency_Hz;
-	t->block.drive_V[0] = dc ? t->dc_drive_V : t->bench->scan.drive_V;
+	t->block.drive_V[0] = dc ? t->dc_drive_V : t->drive_V;
 	t->block.temperature_degC[0] = sim_temperature_degC(t->bench, at_s);
 	t->block.force_N[0] = sim_press_load_N(&t->press, at_s);
 	int code = connect(t, &first);
