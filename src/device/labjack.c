@@ -144,7 +144,8 @@ static int read_inputs(void *context, const int *inputs, size_t n, double *volts
 	return code;
 }
 
-static const tactus_daq_operations operations = {set_lines, set_output, read_inputs};
+static const tactus_daq_operations operations = {
+	.set_lines = set_lines, .set_output = set_output, .read_inputs = read_inputs};
 
 /* ---- who it is ---- */
 

@@ -9,6 +9,7 @@
 
 #include "device/ati_records.h"
 #include "device/hid_report.h"
+#include "device/labjack_packet.h"
 #include "device/lines.h"
 #include "device/mcc_protocol.h"
 #include "device/modbus.h"
@@ -204,10 +205,37 @@ static void read_mcc(const uint8_t *data, size_t size)
 				FUZZ_HOLDS(isfinite(tactus_mcc_volts(&scale, input, code)));
 }
 
+/* ---- LabJack: packets of a stream one after the other, as samples of slots of three lines and two inputs ---- */
+
+static void read_labjack(const uint8_t *data, size_t size)
+{
+	labjack_slots slots = {.count = 6,
+						   .levels = {0x101, 0x102, 0x104, 1, 2, 4},
+						   .mask = 0x107,
+						   .banks = {0, 1},
+						   .bank_count = 2,
+						   .input_count = 2};
+	labjack_packet packet;
+	long length;
+	for (size_t at = 0; at < size && (length = labjack_packet_parse(data + at, size - at, &packet)) > 0;
+		 at += (size_t)length) {
+		FUZZ_HOLDS(length >= LABJACK_PACKET_HEADER && length <= LABJACK_PACKET_MAX && (size_t)length <= size - at);
+		for (size_t i = 0; i < packet.samples; i++) {
+			const uint64_t before = slots.number;
+			const long slot = labjack_slots_put(&slots, labjack_packet_sample(data + at, i), &packet);
+			FUZZ_HOLDS(slot >= -1 && slot < 6 && slots.number >= before);
+			const unsigned lines = slots.samples[0] | (slots.samples[1] & 1U) << 8;
+			if (slot >= 0) /* it is what its lines say, whatever was lost before */
+				FUZZ_HOLDS((lines & 0x107) == slots.levels[slot]);
+		}
+	}
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-	static void (*const parsers[])(const uint8_t *data, size_t size) = {
-		read_lines, read_uri, read_ati, read_robotiq, read_hid, read_scale, judge_modbus, read_profile, read_mcc};
+	static void (*const parsers[])(const uint8_t *data,
+								   size_t size) = {read_lines, read_uri,     read_ati,     read_robotiq, read_hid,
+												   read_scale, judge_modbus, read_profile, read_mcc,     read_labjack};
 	if (size > 0)
 		parsers[data[0] % (sizeof(parsers) / sizeof(*parsers))](data + 1, size - 1);
 	return 0;
