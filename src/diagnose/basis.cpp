@@ -142,21 +142,22 @@ class Collector
 			 bool unknown = false)
 	{
 		Group group{covariate, aspect, unknown, {}, values};
-		std::vector<VectorXd> kept;
+		Index kept = 0;
+		group.columns.resize(problem.rows(), columns.cols() * Index(problem.output_count));
 		for (size_t o = 0; o < problem.output_count; o++)
 			for (Index j = 0; problem.outputs[o] && j < columns.cols(); j++) {
 				VectorXd column = VectorXd::Zero(problem.rows());
 				for (const Run &run : problem.runs)
 					if (run.output == o)
 						column.segment(run.first, run.count) = columns.col(j).segment(run.first, run.count);
-				if (column.allFinite() && column.norm() > 0)
-					kept.push_back(column / column.norm() * std::sqrt(double(problem.rows())));
+				const double size = column.norm();
+				if (column.allFinite() && size > 0)
+					group.columns.col(kept++) = column / size * std::sqrt(double(problem.rows()));
 			}
-		if (kept.empty())
+		if (kept == 0)
 			return;
-		group.columns.resize(problem.rows(), Index(kept.size()));
-		for (size_t j = 0; j < kept.size(); j++)
-			group.columns.col(Index(j)) = kept[j];
+		if (kept < group.columns.cols())
+			group.columns.conservativeResize(Eigen::NoChange, kept);
 		result.push_back(std::move(group));
 	}
 	std::vector<Group> result;

@@ -47,24 +47,27 @@ class Diagnosis
 void Diagnosis::noise(Work &work, const VectorXd &y, const Hypothesis &h, bool candidates)
 {
 	Problem &problem = *work.problem;
-	std::vector<VectorXd> columns;
+	std::vector<VectorXd> made;
 	for (const Slot &slot : problem.slots(h)) {
 		Hypothesis moved = h;
 		Problem::value(moved, slot) += 1e-3 * slot.scale;
 		VectorXd there;
 		if (problem.simulate(moved, there) && (there - y).norm() > 0)
-			columns.push_back(there - y);
+			made.push_back(there - y);
 	}
 	for (size_t i = 0; candidates && problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
 		if (h.has(effect) || effect->testable(problem.segments.front()))
 			continue;
 		Grid grid = grid_of(problem, h, y, effect, 0, true, [](const VectorXd &column) { return column; });
-		std::move(grid.columns.begin(), grid.columns.end(), std::back_inserter(columns));
+		std::move(grid.columns.begin(), grid.columns.end(), std::back_inserter(made));
 	}
+	Columns columns;
+	for (const VectorXd &column : made)
+		columns.emplace_back(column.data(), column.size());
 	for (const Group &group : work.evidence.groups)
 		for (Index j = 0; j < group.columns.cols(); j++)
-			columns.push_back(group.columns.col(j));
+			columns.emplace_back(group.columns.col(j).data(), group.columns.rows());
 	VectorXd left;
 	problem.noise = estimate_noise(problem, y, columns, left);
 	if (!candidates)

@@ -11,7 +11,7 @@ namespace
 {
 
 /* The most telling columns of one output, of length 1, with the residual last; their own part only. */
-MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residual, const std::vector<VectorXd> &columns)
+MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residual, const Columns &columns)
 {
 	std::vector<std::pair<Index, Index>> pieces;
 	Index n = 0;
@@ -24,9 +24,10 @@ MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residua
 	std::vector<double> size(columns.size());
 	for (size_t j = 0; j < columns.size(); j++) {
 		double square = 0, product = 0;
+		const VectorXd column = columns[j];
 		for (const auto &[first, count] : pieces) {
-			square += columns[j].segment(first, count).squaredNorm();
-			product += columns[j].segment(first, count).dot(residual.segment(first, count));
+			square += column.segment(first, count).squaredNorm();
+			product += column.segment(first, count).dot(residual.segment(first, count));
 		}
 		size[j] = std::sqrt(square);
 		if (size[j] > 0 && std::isfinite(size[j]))
@@ -225,7 +226,7 @@ double spread_of(const std::vector<double> &a)
 
 } // namespace
 
-Noise estimate_noise(const Problem &problem, const VectorXd &y, const std::vector<VectorXd> &columns, VectorXd &left)
+Noise estimate_noise(const Problem &problem, const VectorXd &y, const Columns &columns, VectorXd &left)
 {
 	Noise noise;
 	const VectorXd residual = problem.measured - y;

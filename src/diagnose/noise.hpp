@@ -13,7 +13,8 @@ namespace tactus::explain
  * Thompson 1971), which does not mistake for signal what so many columns take out of slow noise; further ones are
  * Yule–Walker's of what it leaves. left receives the residual of that fit, scaled, at the rows.
  */
-Noise estimate_noise(const Problem &problem, const VectorXd &y, const std::vector<VectorXd> &columns, VectorXd &left);
+using Columns = std::vector<Eigen::Map<const VectorXd>>;
+Noise estimate_noise(const Problem &problem, const VectorXd &y, const Columns &columns, VectorXd &left);
 
 /*
  * The same before anything is fitted, for readings so far off that they would set the scale of everything: far from the

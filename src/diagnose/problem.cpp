@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <unordered_map>
 
 #include "core/core.h"
 
@@ -31,6 +33,59 @@ size_t output_signal(const tactus_domain *domain, size_t output)
 		if (domain->signals[s].role == TACTUS_ROLE_OUTPUT && output-- == 0)
 			return s;
 	return SIZE_MAX;
+}
+
+/* What an effect does to a sample depends on nothing but that sample, and not on its time. */
+bool memoryless(const Part &part)
+{
+	return part.effect->state_size == 0 &&
+		   (part.effect->flags &
+			(TACTUS_EFFECT_CLOCK | TACTUS_EFFECT_ORDER | TACTUS_EFFECT_RESTAMP | TACTUS_EFFECT_LOOKAHEAD)) == 0;
+}
+
+Kinds kinds_of(const tactus_series &series)
+{
+	std::vector<const double *> read(series.domain->signal_count, nullptr);
+	for (size_t s = 0; s < read.size(); s++)
+		if (series.domain->signals[s].role != TACTUS_ROLE_TIME && series.domain->signals[s].role != TACTUS_ROLE_OUTPUT)
+			read[s] = series.signal[s];
+	auto bits = [](double value) {
+		uint64_t word;
+		memcpy(&word, &value, sizeof word);
+		return word;
+	};
+	auto hash = [&](size_t i) {
+		uint64_t sum = 0;
+		for (const double *x : read) {
+			sum = (sum ^ (x ? bits(x[i]) : 0)) * 0x9E3779B97F4A7C15;
+			sum ^= sum >> 32;
+		}
+		return size_t(sum);
+	};
+	auto alike = [&](size_t a, size_t b) {
+		return std::all_of(read.begin(), read.end(), [&](const double *x) { return !x || bits(x[a]) == bits(x[b]); });
+	};
+	std::unordered_map<size_t, size_t, decltype(hash), decltype(alike)> known(1024, hash, alike);
+	Kinds kinds;
+	std::vector<size_t> first;
+	for (size_t i = 0; i < series.n; i++) {
+		const auto [at, fresh] = known.try_emplace(i, first.size());
+		if (fresh)
+			first.push_back(i);
+		if (first.size() > series.n / 4)
+			return {};
+		kinds.of.push_back(at->second);
+	}
+	for (size_t s = 0; s < read.size(); s++) {
+		if (!read[s])
+			continue;
+		kinds.values.emplace_back(new double[first.size()]);
+		kinds.signal[s] = kinds.values.back().get();
+		for (size_t k = 0; k < first.size(); k++)
+			kinds.signal[s][k] = read[s][first[k]];
+	}
+	kinds.count = first.size();
+	return kinds;
 }
 
 struct ChainFree {
@@ -107,6 +162,8 @@ Problem::Problem(std::vector<const tactus_series *> s, const std::vector<std::ve
 		for (size_t i = at; i < values.size(); i++)
 			values[i] /= scale[o];
 	}
+	for (const tactus_series *series : segments)
+		kinds.push_back(kinds_of(*series));
 	measured = Eigen::Map<VectorXd>(values.data(), Index(values.size()));
 	excluded.assign(values.size(), 0);
 	block.assign(values.size(), 0);
@@ -202,21 +259,31 @@ bool Problem::simulate(const Hypothesis &h, VectorXd &y) const
 	if (tactus_chain_new(domain, h.base.data(), effects.data(), parameters.data(), effects.size(), &made) != TACTUS_OK)
 		return false;
 	const std::unique_ptr<tactus_chain, ChainFree> chain(made);
+	const bool simple = std::all_of(h.parts.begin(), h.parts.end(), memoryless);
 	y.resize(rows());
 	std::vector<double> buffer;
 	for (size_t k = 0; k < segments.size(); k++) {
-		const size_t n = segments[k]->n;
+		const bool few = simple && kinds[k].count > 0;
+		const size_t n = few ? kinds[k].count : segments[k]->n;
 		buffer.resize(n * output_count);
 		double *signal[TACTUS_SIGNALS_MAX];
-		std::copy_n(segments[k]->signal, TACTUS_SIGNALS_MAX, signal);
+		std::copy_n(few ? kinds[k].signal : segments[k]->signal, TACTUS_SIGNALS_MAX, signal);
 		for (size_t o = 0; o < output_count; o++)
 			signal[output_signal(domain, o)] = outputs[o] ? buffer.data() + o * n : nullptr;
 		tactus_chain_reset(chain.get());
 		if (tactus_chain_run(chain.get(), n, signal) != TACTUS_OK)
 			return false;
-		for (const Run &run : runs)
-			for (Index i = run.first; run.segment == k && i < run.first + run.count; i++)
-				y[i] = buffer[run.output * n + sample[size_t(i)]] / scale[run.output];
+		for (const Run &run : runs) {
+			if (run.segment != k)
+				continue;
+			double *values = buffer.data() + run.output * n;
+			for (size_t i = 0; i < n; i++)
+				values[i] /= scale[run.output];
+			for (Index i = run.first; i < run.first + run.count; i++) {
+				const size_t at = sample[size_t(i)];
+				y[i] = values[few ? kinds[k].of[at] : at];
+			}
+		}
 	}
 	return y.allFinite();
 }

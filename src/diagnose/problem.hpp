@@ -6,6 +6,7 @@
 #define TACTUS_DIAGNOSE_PROBLEM_HPP
 
 #include <Eigen/Dense>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -79,6 +80,17 @@ bool searched(const tactus_effect *effect, size_t parameter, enum tactus_search_
 /* Which rows a fit may see. */
 enum class Rows { train, all };
 
+/*
+ * Samples of a segment that are alike in all that a chain reads but the time: what has no memory need be computed for
+ * the first of each kind only. Bench recordings of known loads hold a few hundred kinds.
+ */
+struct Kinds {
+	std::vector<size_t> of; /* of every sample: its kind; empty: too many kinds */
+	size_t count = 0;
+	std::vector<std::unique_ptr<double[]>> values; /* that the signals of the kinds are in */
+	double *signal[TACTUS_SIGNALS_MAX] = {};       /* NULL where the series has none */
+};
+
 class Problem
 {
   public:
@@ -151,6 +163,7 @@ class Problem
 	std::vector<double> held_out(const Fit &fit) const;
 
   private:
+	std::vector<Kinds> kinds; /* per segment */
 	bool derivatives(const Hypothesis &h, const VectorXd &y0, const std::vector<Slot> &slots, MatrixXd &d) const;
 	void finish(Fit &fit, Rows which) const;
 	void refine_instants(Fit &fit, Rows which) const;
