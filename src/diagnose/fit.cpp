@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "diagnose/problem.hpp"
+#include "fit/converged.hpp"
 #include "fit/fit_internal.h"
 #include "fit/forward_structure.hpp"
 
@@ -72,23 +73,6 @@ class Cost : public ceres::CostFunction
 	const std::vector<Slot> &slots;
 	const Rows which;
 	const Derivatives derivatives;
-};
-
-class Converged : public ceres::IterationCallback
-{
-  public:
-	explicit Converged(const Cost *c) : cost(c)
-	{
-	}
-	ceres::CallbackReturnType operator()(const ceres::IterationSummary &summary) override
-	{
-		/* Within a hundredth of the standard errors, or creeping along by what no decision hangs on. */
-		const bool near = cost->offset < 1e-2 || (summary.iteration > 3 && summary.cost_change < 0.02);
-		return summary.step_is_successful && near ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
-	}
-
-  private:
-	const Cost *cost;
 };
 
 } // namespace
@@ -257,7 +241,10 @@ Fit Problem::fit(const Hypothesis &start, Rows which) const
 		options.max_num_iterations = 60;
 		options.function_tolerance = 1e-7;
 		options.parameter_tolerance = 1e-8;
-		Converged converged(cost);
+		/* Within a hundredth of the standard errors, or creeping along by what no decision hangs on. */
+		Converged converged([cost](const ceres::IterationSummary &summary) {
+			return cost->offset < 1e-2 || (summary.iteration > 3 && summary.cost_change < 0.02);
+		});
 		options.callbacks.push_back(&converged);
 		ceres::Solver::Summary summary;
 		ceres::Solve(options, &problem, &summary);

@@ -12,6 +12,7 @@
 #include <mutex>
 
 #include "core/core.h"
+#include "fit/converged.hpp"
 #include "fit/forward_structure.hpp"
 
 namespace
@@ -191,23 +192,6 @@ class Projected : public ceres::CostFunction
 	Solver *solver;
 };
 
-/* Ends the minimisation when what is left to gain is far below what the data can tell. */
-class Converged : public ceres::IterationCallback
-{
-  public:
-	explicit Converged(const Projected *p) : projected(p)
-	{
-	}
-	ceres::CallbackReturnType operator()(const ceres::IterationSummary &summary) override
-	{
-		return summary.step_is_successful && projected->offset < 1e-3 ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
-																	  : ceres::SOLVER_CONTINUE;
-	}
-
-  private:
-	const Projected *projected;
-};
-
 int Solver::minimise()
 {
 	if (!eliminate(best))
@@ -236,7 +220,7 @@ int Solver::minimise()
 	options.function_tolerance = 1e-10;
 	options.gradient_tolerance = 1e-14;
 	options.parameter_tolerance = 1e-9;
-	Converged converged(projected);
+	Converged converged([projected](const ceres::IterationSummary &) { return projected->offset < 1e-3; });
 	options.callbacks.push_back(&converged);
 	ceres::Solver::Summary summary;
 	ceres::Solve(options, &ceres_problem, &summary);
