@@ -131,6 +131,37 @@ static void neutral_changes_nothing_to_the_last_bit(void **unused)
 	for_every_effect(check_neutral);
 }
 
+/*
+ * What has no memory and reads no clock may be computed in any order: an effect that says so by its flags gives a
+ * sample the same bits wherever it stands.
+ */
+static void check_order(const tactus_domain *domain, const tactus_effect *effect)
+{
+	const unsigned ordered =
+		TACTUS_EFFECT_CLOCK | TACTUS_EFFECT_ORDER | TACTUS_EFFECT_RESTAMP | TACTUS_EFFECT_LOOKAHEAD;
+	double p[TACTUS_PARAMETERS_MAX];
+	if ((effect->flags & ordered) != 0)
+		return;
+	rig_recording there = rig_record(domain, ROWS), back = rig_record(domain, ROWS);
+	for (size_t s = 0; s < domain->signal_count; s++)
+		for (size_t i = 0; domain->signals[s].role != TACTUS_ROLE_TIME && i < ROWS; i++)
+			rig_column(&back, s)[i] = rig_column(&there, s)[ROWS - 1 - i];
+	start(effect, p);
+	rig_run(&there, effect, p, ROWS);
+	rig_run(&back, effect, p, ROWS);
+	for (size_t s = 0; s < domain->signal_count; s++)
+		for (size_t i = 0; rig_is_output(&there, s) && i < ROWS; i++)
+			assert_memory_equal(&there.signal[s][i], &back.signal[s][ROWS - 1 - i], sizeof(double));
+	rig_free(&there);
+	rig_free(&back);
+}
+
+static void what_has_no_memory_knows_no_order(void **unused)
+{
+	(void)unused;
+	for_every_effect(check_order);
+}
+
 /* The largest difference of an output between two recordings, relative to the output's size. */
 static double difference(const rig_recording *a, const rig_recording *b)
 {
@@ -307,6 +338,7 @@ int main(void)
 		cmocka_unit_test(the_published_names_stay),
 		cmocka_unit_test(covariates_are_columns),
 		cmocka_unit_test(neutral_changes_nothing_to_the_last_bit),
+		cmocka_unit_test(what_has_no_memory_knows_no_order),
 		cmocka_unit_test(every_strength_shows_and_fades_towards_neutral),
 		cmocka_unit_test(blocks_of_any_size_give_the_same_bits),
 		cmocka_unit_test(a_missing_input_gives_no_output_and_leaves_the_state),
