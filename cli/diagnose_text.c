@@ -213,10 +213,14 @@ static void say_rest(const struct page *page, const tactus_diagnosed *series)
 {
 	struct words words = {0};
 	char share[32];
-	for (size_t i = 0; i < series->unexplained_count && i < CONSIDERED; i++)
-		page_item(page, i ? "" : "Left over", "%s (%s of what is left depends on %s).",
-				  series->unexplained[i].text ? series->unexplained[i].text : "",
-				  cli_percent(series->unexplained[i].explained, share), series->unexplained[i].covariate);
+	for (size_t i = 0; i < series->unexplained_count && i < CONSIDERED; i++) {
+		const tactus_dependence *left = &series->unexplained[i];
+		if (left->explained > 0)
+			page_item(page, i ? "" : "Left over", "%s (%s of what is left depends on %s).", left->text,
+					  cli_percent(left->explained, share), left->covariate);
+		else /* its text says all of it */
+			page_item(page, i ? "" : "Left over", "%s.", left->text);
+	}
 	if (series->structure_remains && !series->unexplained_count)
 		page_item(page, "Left over", "structure remains that no effect of the catalogue explains.");
 	size_t n = 0;
@@ -279,12 +283,7 @@ static void say_next(const struct page *page)
 	enum tactus_verdict verdict = page->diagnosis->verdict;
 	bool extends = verdict == TACTUS_VERDICT_CAUSE_FOUND || verdict == TACTUS_VERDICT_STALE_CALIBRATION;
 	if (experiment) {
-		char bic[32];
-		if (isfinite(experiment->expected_delta_bic))
-			page_item(page, "Next", "%s (expected evidence: ΔBIC %s).", experiment->text,
-					  cli_bic(-fabs(experiment->expected_delta_bic), bic));
-		else
-			page_item(page, "Next", "%s%s", experiment->text, full_stop(experiment->text));
+		page_item(page, "Next", "%s%s", experiment->text, full_stop(experiment->text));
 		command_line(page, experiment->command);
 	} else if (verdict == TACTUS_VERDICT_BAD_RECORDING) {
 		page_item(page, "Next", "look at the recording: `tactus show` says what is in it.");

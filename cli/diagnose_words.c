@@ -139,9 +139,9 @@ const char *cli_of_noise(const tactus_base_error *base, char text[32])
 	double share = base->rmse / base->noise_floor;
 	if (!(base->noise_floor > 0))
 		return none(text);
-	if (!(share >= 10) || share > 1e9)
+	if (!(share >= 1.5) || share > 1e9)
 		return cli_percent(share, text);
-	snprintf(text, 32, "%.0f ×", share);
+	snprintf(text, 32, share < 9.95 ? "%.1f ×" : "%.0f ×", share);
 	return text;
 }
 

@@ -290,12 +290,6 @@ static void experiment(const struct html *html, const tactus_diagnosed *series)
 	html_element(html, "h3", "The next experiment");
 	html_element(html, "p", e->text);
 	html_element(html, "pre", e->command);
-	char text[32];
-	if (isfinite(e->expected_delta_bic)) {
-		fputs("<p class=\"soft\">Expected evidence: ΔBIC ", html->out);
-		html_text(html, cli_bic(-fabs(e->expected_delta_bic), text));
-		fputs("</p>\n", html->out);
-	}
 }
 
 void html_series(const struct html *html, size_t index)

@@ -8,6 +8,7 @@
 #include "core/core.h"
 #include "device/device.h"
 #include "device/reference.h"
+#include "device/uri.h"
 
 #define PAUSE_FIRST_S 0.1 /* between attempts to find a lost device, doubled up to: */
 #define PAUSE_LAST_S 2
@@ -44,14 +45,32 @@ tactus_scan_settings tactus_scan_defaults(void)
 	return settings;
 }
 
-int tactus_device_open(const char *uri, tactus_device **result)
+/* NULL: none has this scheme. */
+static const tactus_backend *backend_of(const char *uri)
 {
 	const char *colon = strchr(uri, ':');
-	const tactus_backend *backend = NULL;
 	for (size_t i = 0; i < TACTUS_COUNT(backends) && colon != NULL; i++)
 		if (strlen(backends[i]->scheme) == (size_t)(colon - uri) &&
 			strncmp(backends[i]->scheme, uri, (size_t)(colon - uri)) == 0)
-			backend = backends[i];
+			return backends[i];
+	return NULL;
+}
+
+bool tactus_device_accepts(const char *uri)
+{
+	const tactus_backend *backend = backend_of(uri);
+	tactus_device *device = NULL;
+	if (backend == NULL || backend->live)
+		return backend != NULL;
+	if (tactus_device_open(uri, &device) < 0)
+		return false;
+	tactus_device_close(device);
+	return true;
+}
+
+int tactus_device_open(const char *uri, tactus_device **result)
+{
+	const tactus_backend *backend = backend_of(uri);
 	if (backend == NULL)
 		return fail_unknown_scheme(uri);
 	tactus_device *device = calloc(1, sizeof(*device));
@@ -60,10 +79,14 @@ int tactus_device_open(const char *uri, tactus_device **result)
 	if (code >= 0) {
 		device->backend = backend;
 		device->metadata = metadata;
-		code = backend->open(device, colon + 1);
+		device->uri = tactus_strndup(uri, strlen(uri));
+		code = device->uri != NULL ? backend->open(device, strchr(uri, ':') + 1)
+								   : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	}
 	if (code < 0) {
 		tactus_metadata_free(metadata);
+		if (device != NULL)
+			free(device->uri);
 		free(device);
 		return code;
 	}
@@ -79,6 +102,7 @@ void tactus_device_close(tactus_device *device)
 	device->backend->close(device);
 	tactus_reference_free(device->reference);
 	tactus_metadata_free(device->metadata);
+	free(device->uri);
 	free(device);
 }
 
@@ -96,6 +120,17 @@ static int clear(tactus_device *device)
 	device->extras[0][0] = '\0';
 	device->lost_ns = 0;
 	return TACTUS_OK;
+}
+
+/* What has to be given to scan this device again, where its identity is not that. A replay repeats what was recorded.
+ */
+static int say_uri(tactus_device *device)
+{
+	const char *identity = tactus_metadata_get(device->metadata, "device");
+	const bool said = identity == NULL || strcmp(identity, device->uri) == 0 || strchr(device->uri, ':')[1] == '\0';
+	return said || device->backend == &tactus_backend_replay
+			   ? TACTUS_OK
+			   : tactus_metadata_set(device->metadata, "uri", device->uri);
 }
 
 /* What is given on request was true half a round trip before the answer came, and is stamped so. */
@@ -144,6 +179,8 @@ int tactus_device_start(tactus_device *device, const tactus_scan_settings *setti
 	if (code >= 0)
 		code = device->backend->start(device, &asked);
 	device->running = code >= 0;
+	if (code >= 0)
+		code = say_uri(device);
 	if (code >= 0)
 		code = say_timing(device);
 	if (code < 0 && device->reference != NULL)

@@ -50,6 +50,7 @@ typedef struct tactus_backend {
 struct tactus_device {
 	const tactus_backend *backend;
 	const char *scheme; /* of the URI, where several schemes share a backend; static */
+	char *uri;          /* as it was opened */
 	void *state;
 	tactus_metadata *metadata;
 	uint64_t expected_scans;

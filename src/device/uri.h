@@ -5,6 +5,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { TACTUS_URI_OPTIONS_MAX = 16 };
 
 typedef struct {
@@ -34,5 +38,14 @@ int tactus_uri_choice(tactus_uri *uri, const char *key, const char *const *words
 int tactus_uri_check(const tactus_uri *uri);
 /* Splits "HOST:PORT", "[::1]:PORT" or "HOST": the host is copied. TACTUS_ERR_ARGUMENT if the port is no port. */
 int tactus_uri_host(const tactus_uri *uri, int default_port, char *host, size_t size, int *port);
+/*
+ * True if a scan would take this URI, scheme and all: what does not run by the clock is opened to see, of a real device
+ * the scheme must be known.
+ */
+bool tactus_device_accepts(const char *uri);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

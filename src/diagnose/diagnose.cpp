@@ -7,6 +7,7 @@
 #include <tactus/version.h>
 
 #include "core/core.h"
+#include "device/uri.h"
 #include "diagnose/gather.hpp"
 #include "diagnose/noise.hpp"
 #include "fit/fit_work.h"
@@ -36,6 +37,7 @@ class Diagnosis
 	void hold_stated(Work &work, Hypothesis &base) const;
 	int extended();
 	void summarise();
+	const char *scanned() const;
 
 	const tactus_diagnose_options &options;
 	Gathered gathered;
@@ -305,6 +307,18 @@ int Diagnosis::extended()
 	return TACTUS_OK;
 }
 
+/* The URI that the next experiment is written for: as asked, else that of the recording if a scan would take it. */
+const char *Diagnosis::scanned() const
+{
+	const tactus_metadata *metadata = tactus_table_metadata(recordings.front().table);
+	if (options.device)
+		return options.device;
+	for (const char *key : {"uri", "device"})
+		if (const char *uri = tactus_metadata_get(metadata, key); uri && tactus_device_accepts(uri))
+			return uri;
+	return "sim:";
+}
+
 int Diagnosis::run()
 {
 	int status = gathered.run(*store);
@@ -328,9 +342,7 @@ int Diagnosis::run()
 	for (const std::string &failed : task.failed)
 		if (!failed.empty())
 			return tactus_fail(TACTUS_ERR_MEMORY, "the diagnosis failed: %s", failed.c_str());
-	const char *device = options.device
-							 ? options.device
-							 : tactus_metadata_get(tactus_table_metadata(recordings.front().table), "device");
+	const char *device = scanned();
 	for (Work &work : works) {
 		if (!work.outliers.empty() || !gathered.wild[work.channel].empty()) {
 			std::vector<size_t> rows = gathered.wild[work.channel];
@@ -348,10 +360,10 @@ int Diagnosis::run()
 							   rows.size(), rows.size() == 1 ? " is" : "s are",
 							   work.output_name[0].empty() ? work.output_name[1].c_str() : work.output_name[0].c_str(),
 							   rows.size() == 1 ? "it" : "them"),
-				 0, work.channel, false, store->keep(std::vector<size_t>(rows.begin(), rows.begin() + long(shown))),
-				 shown});
+				 0, work.said_channel(), false,
+				 store->keep(std::vector<size_t>(rows.begin(), rows.begin() + long(shown))), shown});
 		}
-		store->series.push_back(report(*store, work, device ? device : "sim:", options.seed ? options.seed : 1));
+		store->series.push_back(report(*store, work, device, options.seed ? options.seed : 1));
 	}
 	summarise();
 	status = extended();

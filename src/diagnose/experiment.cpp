@@ -140,7 +140,7 @@ std::string scan_command(const Work &work, const char *device, const std::string
 	std::string command = "tactus scan ";
 	const std::string uri = device;
 	command += uri.find_first_of(" \t\"'") == std::string::npos ? uri : "'" + uri + "'";
-	if (work.channel > 0 && work.problem->domain->loaded)
+	if (work.said_channel() > 0)
 		command += " --channels " + std::to_string(work.channel);
 	return command + " " + rest + " -o next.csv";
 }
@@ -211,6 +211,19 @@ const tactus_experiment *made(Store &store, const std::vector<std::string> &name
 	return store.keep(std::vector<tactus_experiment>{e});
 }
 
+/* Where another column plays the load nothing here can move it: in words, at the same pace. */
+std::string by_hand(const Work &work)
+{
+	const tactus_series *series = work.problem->segments.front();
+	const int input = int(work.problem->input_signal());
+	const size_t suffix = work.input_name.rfind('_');
+	const std::string unit = suffix == std::string::npos ? "" : work.input_name.substr(suffix + 1);
+	if (work.pressed() || !work.problem->domain->loaded)
+		return "";
+	return "; meanwhile move " + work.input_name + " from " + quantity(tactus_series_minimum(series, input), unit) +
+		   " to " + quantity(tactus_series_maximum(series, input), unit) + " and back, twice, 20 s each way";
+}
+
 /* What can only be told by varying something that no load protocol moves. */
 std::string by_covariate(const Work &work, const char *device, const tactus_effect *effect)
 {
@@ -219,7 +232,8 @@ std::string by_covariate(const Work &work, const char *device, const tactus_effe
 	const std::string loads = steps_of({"repeat 2 (ramp 0N..{H} 20s, ramp {H}..0N 20s)", 10, ""}, 0, high);
 	if (!work.problem->domain->loaded)
 		return scan_command(work, device, "--loads standard --mode dc,ac");
-	std::string command = command_of(work, device, loads, 10);
+	std::string command =
+		work.pressed() ? command_of(work, device, loads, 10) : scan_command(work, device, "--rate 10Hz --duration 80s");
 	if (covariate == "drive_V") {
 		std::string second = command;
 		second.replace(second.find(" -o next.csv"), 12, " --drive 1V --append -o next.csv");
@@ -279,14 +293,15 @@ const tactus_experiment *propose(Store &store, const Work &work, const char *dev
 			Menu(work).best([&](Synthetic &s) { return evidence_of(work, s, ours, first->hypothesis); });
 		if (choice.item && choice.evidence > limits.margin) {
 			char expected[96];
-			snprintf(expected, sizeof expected, "; expected evidence between %s and %s: %.0f in BIC", names[0].c_str(),
+			snprintf(expected, sizeof expected, "; expected evidence between %s and %s: ΔBIC −%.0f", names[0].c_str(),
 					 first->name.c_str(), choice.evidence);
 			return made(store, names, command_of(work, device, choice.steps, choice.rate_Hz),
 						std::string(choice.item->what) + expected, choice.evidence);
 		}
 	}
 	if (first)
-		return made(store, names, by_covariate(work, device, first->effect), text_of(first->effect), NAN);
+		return made(store, names, by_covariate(work, device, first->effect), text_of(first->effect) + by_hand(work),
+					NAN);
 	const std::string apart = effect && effect->twin_separated_by ? effect->twin_separated_by
 							  : d.moved.separated_by              ? d.moved.separated_by
 																  : "another experiment";

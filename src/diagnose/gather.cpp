@@ -148,8 +148,9 @@ int Gathered::gate(Store &store)
 		const int status = tactus_gates(r.table, r.series, r.count, channels.data(), &found);
 		for (size_t i = 0; i < found.count; i++) {
 			const tactus_gate_problem &p = found.items[i];
-			store.problems.push_back({p.kind, store.text(p.text), k, p.channel, p.fatal,
-									  store.keep(std::vector<size_t>(p.rows, p.rows + p.row_count)), p.row_count});
+			store.problems.push_back({p.kind, store.text(p.text), k, r.series->domain->by_channel ? p.channel : 0,
+									  p.fatal, store.keep(std::vector<size_t>(p.rows, p.rows + p.row_count)),
+									  p.row_count});
 			if (p.fatal)
 				hopeless[p.channel] = store.problems.back().text;
 		}

@@ -390,7 +390,7 @@ std::string summary_of(const tactus_diagnosed &s)
 tactus_diagnosed report(Store &store, const Work &work, const char *device, uint64_t seed)
 {
 	tactus_diagnosed s{};
-	s.channel = work.channel;
+	s.channel = work.said_channel();
 	s.every = work.every;
 	if (work.hopeless || !work.decision.base.ok) {
 		s.verdict = TACTUS_VERDICT_BAD_RECORDING;

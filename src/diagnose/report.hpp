@@ -40,13 +40,23 @@ struct Store {
 /* One series on its way through. */
 struct Work {
 	/* A press can follow a protocol, and the live inverse gives newtons: not where another column plays the load. */
-	bool newtons() const
+	bool pressed() const
 	{
 		const size_t n = input_name.size();
-		return problem->domain->loaded && problem->input_range > 0 && n > 2 && input_name.compare(n - 2, 2, "_N") == 0;
+		return problem->domain->loaded && n > 2 && input_name.compare(n - 2, 2, "_N") == 0;
+	}
+	bool newtons() const
+	{
+		return pressed() && problem->input_range > 0;
 	}
 
-	int channel = 0;
+	/* 0 where the whole recording is one series. */
+	int said_channel() const
+	{
+		return problem->domain->by_channel ? channel : 0;
+	}
+
+	int channel = 0;                    /* in models: 1 where the whole recording is one series */
 	std::vector<tactus_series> thinned; /* own copies where the recording is longer than is looked at */
 	std::vector<std::vector<double>> buffers;
 	std::unique_ptr<Problem> problem;

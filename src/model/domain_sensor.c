@@ -59,6 +59,7 @@ static const tactus_twin twins[] = {
 
 const struct tactus_domain tactus_domain_sensor = {
 	.name = "sensor",
+	.by_channel = true,
 	.loaded = true,
 	.summary = "force → conductance and capacitance of a film sensor (any column with --input, --output)",
 	.signals = signals,

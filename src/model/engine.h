@@ -163,7 +163,8 @@ typedef struct {
 
 struct tactus_domain {
 	const char *name, *summary;
-	bool loaded; /* the input is a load in newtons: a press can follow a protocol, the live inverse is a force */
+	bool by_channel; /* each channel of a recording is a series of its own; else the whole recording is one */
+	bool loaded;     /* the input is a load in newtons: a press can follow a protocol, the live inverse is a force */
 	const tactus_signal *signals;
 	size_t signal_count;
 	const tactus_stage *stages;

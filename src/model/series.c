@@ -71,7 +71,7 @@ static int by_channel(const void *a, const void *b)
 /* Rows by channel, in the order of the numbers; rows without a channel belong to none. */
 static int make_groups(const tactus_columns *columns, groups *g)
 {
-	bool by_number = columns->channel != NULL && columns->domain == &tactus_domain_sensor;
+	bool by_number = columns->channel != NULL && columns->domain->by_channel;
 	for (size_t r = 0; r < columns->rows; r++) {
 		int channel = 1;
 		if (by_number && isnan(columns->channel[r]))

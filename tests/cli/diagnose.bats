@@ -255,7 +255,35 @@ survives() {
 @test "a readout recording is diagnosed as one" {
 	tactus diagnose "$examples/recording-readout.csv" --domain readout --json >result.json
 	contract <result.json
-	jq -e '.domain == "readout" and (.series | length > 0)' result.json
+	jq -e '.domain == "readout" and (.series | length > 0) and all(.series[]; .channel == null)' result.json
+}
+
+@test "the command to paste names what scan accepts: the bench that was scanned, a device by its URI, never its description" {
+	cp "$BATS_FILE_TMPDIR/creep.toml" .
+	tactus scan sim:creep.toml --protocol "rest 2s, hold 150N 60s" --channels 1 --mode dc -q -o once.csv
+	[ "$(metadata device <once.csv) $(metadata uri <once.csv)" = "sim:creeping sim:creep.toml" ]
+	next() { tactus diagnose once.csv --json | jq -r '.series[0].next_experiment.command'; }
+	[[ $(next) == "tactus scan sim:creep.toml "* ]]
+	mv creep.toml elsewhere.toml
+	[[ $(next) == "tactus scan sim: "* ]]
+	sed -i '/^# uri:/d; s/^# device: .*/# device: usb:09db:00a9:0123/' once.csv
+	[[ $(next) == "tactus scan usb:09db:00a9:0123 "* ]]
+	sed -i 's/^# device: .*/# device: ACME logger, serial 7/' once.csv
+	[[ $(next) == "tactus scan sim: "* ]]
+}
+
+@test "a load that is no force is moved by hand: the proposed experiment speaks of its unit, not of newtons" {
+	pressed() { awk -v slope="$1" 'BEGIN { srand(7); print "time_s,drive_V,pressure_Pa,voltage_V"
+		for (i = 0; i < 600; i++) { t = i / 10; p = 4000 * (t % 20 < 10 ? t % 10 : 10 - t % 10)
+			printf "%.1f,2,%.6g,%.6g\n", t, p, 0.5 + slope * p + 1e-3 * (rand() - 0.5) } }'; }
+	pressed 1e-4 | cut -d, -f1,3,4 >before.csv
+	pressed 1.1e-4 >after.csv
+	tactus fit before.csv --domain sensor --input pressure_Pa --output voltage_V --model forward -q -o model.toml
+	tactus diagnose after.csv -m model.toml --json >result.json
+	jq -e '.verdict == "ambiguous"' result.json
+	jq -r '.series[0].next_experiment | .command, .text' result.json >next
+	grep -q 'pressure_Pa from 0 Pa to 40 kPa' next
+	if grep -E '[0-9]N' next; then fail "newtons"; fi
 }
 
 @test "the experiment that is proposed for an ambiguous recording resolves it" {
