@@ -305,13 +305,27 @@ static int check_writes(registers *r)
 	return TACTUS_OK;
 }
 
+/* Of a device that scans by itself: its switches need their time. */
+static int check_rate(const registers *r)
+{
+	const size_t modes = (r->modes & TACTUS_MODE_DC ? 1 : 0) + (r->modes & TACTUS_MODE_AC ? 1 : 0);
+	const double longest_s = (double)(r->channel_count * modes) * r->values[TACTUS_FROM_SETTLE];
+	if (longest_s > r->period_s * (1 + 1e-9))
+		return tactus_fail(TACTUS_ERR_ARGUMENT,
+						   "%g scans a second are too many: %zu readings with %g ms to settle take %.3g ms",
+						   r->values[TACTUS_FROM_RATE], r->channel_count * modes, 1e3 * r->values[TACTUS_FROM_SETTLE],
+						   1e3 * longest_s);
+	return TACTUS_OK;
+}
+
 static int plan(registers *r, const tactus_scan_settings *settings)
 {
 	int code = choose_channels(r, settings);
 	code = code < 0 ? code : choose_modes(r, settings);
 	code = code < 0 ? code : choose_rate(r, settings);
 	code = code < 0 ? code : choose_rest(r, settings);
-	return code < 0 ? code : check_writes(r);
+	code = code < 0 ? code : check_writes(r);
+	return code < 0 || !r->profile->has_counter ? code : check_rate(r);
 }
 
 /* ---- what the recording says ---- */
