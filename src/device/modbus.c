@@ -43,7 +43,7 @@ struct tactus_modbus {
 	unsigned silent;               /* attempts in a row without any answer */
 	bool interrupted;              /* a signal came during the present request */
 	bool doubtful;                 /* an answer may still be under way: */
-	tactus_modbus_request doubted; /* to this one; length 0: unknown */
+	tactus_modbus_request doubted; /* to this one; length 0: to any */
 	uint8_t frame[MODBUS_TCP_MAX_ADU_LENGTH];
 };
 
@@ -171,11 +171,8 @@ int tactus_modbus_reopen(tactus_modbus *link)
 	disconnect(link);
 	if (link->options.serial && !tactus_serial_find(&link->identity, link->options.path, sizeof(link->options.path)))
 		return tactus_fail(TACTUS_ERR_DEVICE, "the adapter of %s is not there", link->name);
-	link->doubtful = false;
-	const int code = connect_link(link);
-	if (code >= 0 && link->options.serial)
-		tactus_modbus_distrust(link);
-	return code;
+	link->doubtful = link->options.serial; /* of the same request as before it was lost, if of any */
+	return connect_link(link);
 }
 
 void tactus_modbus_set_timeout(tactus_modbus *link, double timeout_s)
@@ -392,11 +389,11 @@ static int wait_silence(tactus_modbus *link)
  * Frames of a serial line have no number: an answer that comes later than silence was waited for would pass for the one
  * to the same request made again. So the same is asked with another length first, which is answered after it.
  */
-static int probe(tactus_modbus *link)
+static int probe(tactus_modbus *link, const tactus_modbus_request *next)
 {
-	tactus_modbus_request r = link->doubted;
+	tactus_modbus_request r = link->doubted.length > 0 ? link->doubted : *next;
 	const unsigned count = (unsigned)r.pdu[3] << 8 | r.pdu[4];
-	if (r.length == 0 || r.pdu[0] > MODBUS_FC_READ_INPUT_REGISTERS)
+	if (r.pdu[0] > MODBUS_FC_READ_INPUT_REGISTERS)
 		return TACTUS_OK; /* of a write it does no harm: the same was written */
 	const unsigned other = r.pdu[0] <= MODBUS_FC_READ_DISCRETE_INPUTS ? (count > 8 ? count - 8 : count + 8)
 						   : count > 1                                ? count - 1
@@ -410,7 +407,7 @@ static int probe(tactus_modbus *link)
 	return code < 0 && link->exception == 0 ? code : TACTUS_OK;
 }
 
-static int clean(tactus_modbus *link)
+static int clean(tactus_modbus *link, const tactus_modbus_request *next)
 {
 	int code = TACTUS_OK;
 	if (!link->doubtful) {
@@ -424,7 +421,7 @@ static int clean(tactus_modbus *link)
 			code = lose(link, tactus_error_message());
 	} else {
 		code = wait_silence(link);
-		code = code < 0 ? code : probe(link);
+		code = code < 0 ? code : probe(link, next);
 	}
 	link->doubtful = code < 0;
 	link->exception = 0;
@@ -440,7 +437,7 @@ static int attempt(tactus_modbus *link, tactus_modbus_request *r)
 	link->silent++;
 	link->exception = 0;
 	r->transaction = ++link->transaction;
-	int code = clean(link);
+	int code = clean(link, r);
 	code = code < 0 ? code : send_request(link, r);
 	if (code < 0)
 		return code;
