@@ -103,7 +103,8 @@ static int identify(registers *r, bool again)
 		if (code >= 0 && again && strcmp(text, r->facts[i]) != 0)
 			return tactus_fail(TACTUS_ERR_DEVICE, "another device answers at %s: %s is %s, not %s",
 							   tactus_modbus_name(r->link), r->profile->facts[i].name, text, r->facts[i]);
-		snprintf(r->facts[i], FACT_SIZE, "%s", code < 0 ? "" : text);
+		if (code >= 0)
+			snprintf(r->facts[i], FACT_SIZE, "%s", text);
 	}
 	return code;
 }
