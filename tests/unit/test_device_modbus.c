@@ -29,7 +29,7 @@ static const struct {
 	{"twice", 'b', 0, {TWICE}, 0, 0, 0, 0, 0},
 };
 
-/* Where the script begins: the first requests of a test, and the probes of a serial line, are answered. */
+/* A serial line that was just opened is in doubt, and is asked something first: the script begins behind that. */
 static tactus_modbus *connect_to(peer *p, int retries, tactus_faults *faults)
 {
 	tactus_modbus_options options = tactus_modbus_defaults(p->serial);
@@ -42,6 +42,18 @@ static tactus_modbus *connect_to(peer *p, int retries, tactus_faults *faults)
 	options.retries = retries;
 	*faults = (tactus_faults){0};
 	assert_int_equal(tactus_modbus_open(&options, faults, &link), 0);
+	if (p->serial) {
+		const enum peer_act *acts = p->acts;
+		const size_t count = p->count;
+		uint16_t registers[2];
+		p->count = 0;
+		p->acts = NULL;
+		assert_int_equal(tactus_modbus_read(link, TACTUS_MODBUS_HOLDING, 0, 2, registers), 0);
+		p->requests = 0;
+		p->acts = acts;
+		p->count = count;
+		*faults = (tactus_faults){0};
+	}
 	return link;
 }
 
