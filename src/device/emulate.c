@@ -18,9 +18,9 @@
 
 enum { DEVICES_MAX = 8 };
 
-static const tactus_emulated *const devices[] = {&tactus_emulated_labjack_t7, &tactus_emulated_labjack_t4,
-												 &tactus_emulated_board_tcp, &tactus_emulated_board_rtu,
-												 &tactus_emulated_ati_net_ft};
+static const tactus_emulated *const devices[] = {&tactus_emulated_labjack_t7,    &tactus_emulated_labjack_t4,
+												 &tactus_emulated_board_tcp,     &tactus_emulated_board_rtu,
+												 &tactus_emulated_robotiq_ft300, &tactus_emulated_ati_net_ft};
 
 struct tactus_emulator {
 	tactus_emulation world;

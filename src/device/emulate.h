@@ -48,7 +48,7 @@ typedef struct {
 } tactus_emulated;
 
 extern const tactus_emulated tactus_emulated_labjack_t7, tactus_emulated_labjack_t4, tactus_emulated_board_tcp,
-	tactus_emulated_board_rtu, tactus_emulated_ati_net_ft;
+	tactus_emulated_board_rtu, tactus_emulated_robotiq_ft300, tactus_emulated_ati_net_ft;
 
 /* ---- Modbus servers ---- */
 
@@ -70,7 +70,11 @@ typedef struct {
 	modbus_t *modbus;
 	modbus_mapping_t *mapping;
 	int listener; /* −1: a serial line, which is the only client */
-	int line;     /* its other end, kept open so that it never hangs up */
+	/* of a serial line: its other end, kept open so that it never hangs up; a request that is coming */
+	int line, unit;
+	uint8_t frame[MODBUS_MAX_ADU_LENGTH];
+	size_t frame_length;
+	int64_t heard_ns;
 	int clients[TACTUS_EMULATE_CLIENTS];
 	size_t client_count;
 } tactus_modbus_server;

@@ -65,7 +65,7 @@ static double take(board *b, int channel, enum tactus_mode mode, double begin_s)
 {
 	tactus_instrument *instrument = b->world->instrument;
 	tactus_instrument_volts volts = {0};
-	const double read_s = begin_s + 1e-6 * b->holding[SETTLE_US];
+	const double read_s = begin_s + 1e-6 * b->holding[SETTLE_US] * b->world->settings.speed;
 	const int at = FIRST + 6 * channel;
 	tactus_instrument_select(instrument, begin_s, UINT64_C(1) << channel, mode, get_f32(b, DC_DRIVE_V));
 	const int code = tactus_instrument_read(instrument, read_s, &volts);

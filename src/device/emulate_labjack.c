@@ -17,6 +17,7 @@
 #include "device/live.h"
 #include "device/modbus.h"
 
+enum { LINES = 23, BANKS = 4 };
 enum { ILLEGAL_ADDRESS = MODBUS_EXCEPTION_ILLEGAL_DATA_ADDRESS, FAILURE = MODBUS_EXCEPTION_SLAVE_OR_SERVER_FAILURE };
 
 static const emulated_product t7 = {
@@ -35,7 +36,7 @@ static const struct {
 } areas[] = {
 	{LABJACK_AIN0, LABJACK_INPUTS, 2, READ},
 	{LABJACK_DAC0, 2, 2, BOTH},
-	{LABJACK_DIO0, 23, 1, BOTH},
+	{LABJACK_DIO0, LINES, 1, BOTH},
 	{LABJACK_STATE, 4, 1, BOTH},
 	{LABJACK_DIRECTION, 4, 1, BOTH},
 	{LABJACK_DIO_STATE, 1, 2, BOTH},
@@ -129,9 +130,15 @@ static uint32_t bank_lines(int bank)
 	return lines[bank];
 }
 
+/* The lines that a write to one of a bank's registers means: the upper eight bits spare theirs. */
+static uint32_t bank_mask(int bank, uint16_t value)
+{
+	return (~((uint32_t)value >> 8) & 0xff) << 8 * bank & bank_lines(bank);
+}
+
 void emulated_set_bank(emulated_labjack *lj, double time_s, int bank, uint16_t value)
 {
-	const uint32_t mask = (~((uint32_t)value >> 8) & 0xff) << 8 * bank & bank_lines(bank);
+	const uint32_t mask = bank_mask(bank, value);
 	lj->latch = (lj->latch & ~mask) | (((uint32_t)value & 0xff) << 8 * bank & mask);
 	select_bench(lj, time_s);
 }
@@ -195,11 +202,11 @@ static void get_calibration(const emulated_labjack *lj, uint32_t pointer, uint16
 /* What the value at that register is now; plain ones are in memory already. */
 static void get_value(emulated_labjack *lj, int address, uint16_t *registers)
 {
-	if (address >= LABJACK_DIO0 && address < LABJACK_DIO0 + 23)
+	if (address >= LABJACK_DIO0 && address < LABJACK_DIO0 + LINES)
 		registers[0] = levels(lj) >> (address - LABJACK_DIO0) & 1;
-	else if (address >= LABJACK_STATE && address < LABJACK_STATE + 4)
+	else if (address >= LABJACK_STATE && address < LABJACK_STATE + BANKS)
 		registers[0] = emulated_get_bank(lj, address - LABJACK_STATE);
-	else if (address >= LABJACK_DIRECTION && address < LABJACK_DIRECTION + 4)
+	else if (address >= LABJACK_DIRECTION && address < LABJACK_DIRECTION + BANKS)
 		registers[0] = (uint16_t)(lj->outputs >> 8 * (address - LABJACK_DIRECTION) & 0xff);
 	else if (address == LABJACK_DIO_STATE)
 		tactus_modbus_put_u32(registers, levels(lj));
@@ -246,14 +253,14 @@ static bool is_range(const emulated_labjack *lj, float range_V)
 static int check_value(const emulated_labjack *lj, int address, const uint16_t *values)
 {
 	const int line = address - LABJACK_DIO0;
-	const bool is_line = line >= 0 && line < 23;
+	const bool is_line = line >= 0 && line < LINES;
 	if (is_line && (lj->product->lines >> line & 1) == 0)
 		return LABJACK_ERROR_NO_LINE;
 	if (is_line && (lj->analog >> line & 1) != 0)
 		return LABJACK_ERROR_ANALOG;
-	for (int bank = 0; bank < 4; bank++)
+	for (int bank = 0; bank < BANKS; bank++)
 		if (address == LABJACK_STATE + bank || address == LABJACK_DIRECTION + bank) {
-			const uint32_t mask = (~((uint32_t)values[0] >> 8) & 0xff) << 8 * bank & bank_lines(bank);
+			const uint32_t mask = bank_mask(bank, values[0]);
 			return (mask & ~lj->product->lines) != 0 ? LABJACK_ERROR_NO_LINE
 				   : (mask & lj->analog) != 0        ? LABJACK_ERROR_ANALOG
 													 : 0;
@@ -294,15 +301,15 @@ static void set_inputs(emulated_labjack *lj, int address, const uint16_t *values
 static void set_lines(emulated_labjack *lj, int address, const uint16_t *values, double now_s)
 {
 	const uint32_t wide = address >= LABJACK_DIO_STATE ? tactus_modbus_u32(values) : 0;
-	if (address < LABJACK_STATE) {
+	if (address >= LABJACK_DIO0 && address < LABJACK_DIO0 + LINES) {
 		const uint32_t bit = UINT32_C(1) << (address - LABJACK_DIO0);
 		lj->latch = values[0] != 0 ? lj->latch | bit : lj->latch & ~bit;
 		lj->outputs |= bit;
-	} else if (address < LABJACK_DIRECTION) {
+	} else if (address >= LABJACK_STATE && address < LABJACK_STATE + BANKS) {
 		emulated_set_bank(lj, now_s, address - LABJACK_STATE, values[0]);
-	} else if (address < LABJACK_DIO_STATE) {
+	} else if (address >= LABJACK_DIRECTION && address < LABJACK_DIRECTION + BANKS) {
 		const int bank = address - LABJACK_DIRECTION;
-		const uint32_t mask = (~((uint32_t)values[0] >> 8) & 0xff) << 8 * bank & bank_lines(bank);
+		const uint32_t mask = bank_mask(bank, values[0]);
 		lj->outputs = (lj->outputs & ~mask) | (((uint32_t)values[0] & 0xff) << 8 * bank & mask);
 	} else if (address == LABJACK_DIO_STATE) {
 		lj->latch = spared(lj, lj->latch, wide);

@@ -1,5 +1,6 @@
 /* A Modbus server for emulated devices: libmodbus does the framing, the device says what its registers do. */
 #include <errno.h>
+#include <fcntl.h>
 #include <pty.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +9,18 @@
 
 #include "core/core.h"
 #include "device/emulate.h"
+#include "device/live.h"
+#include "device/robotiq_frames.h"
 
-enum { READ_HOLDING = 3, READ_INPUT = 4, WRITE_ONE = 6, WRITE_MANY = 16, REGISTERS = 65536, WRITE_MAX = 123 };
+enum {
+	READ_HOLDING = 3,
+	READ_INPUT = 4,
+	WRITE_ONE = 6,
+	WRITE_MANY = 16,
+	REGISTERS = 65536,
+	WRITE_MAX = 123,
+	SILENCE_NS = 50000000
+};
 
 /* Holding and input registers are the same ones, as in the devices that are emulated. */
 static modbus_mapping_t *new_mapping(void)
@@ -53,8 +64,10 @@ int tactus_modbus_server_open_rtu(tactus_modbus_server *server, int unit, char *
 		return tactus_fail(TACTUS_ERR_DEVICE, "no pseudo-terminal can be had: %s", strerror(errno));
 	cfmakeraw(&raw);
 	(void)tcsetattr(theirs, TCSANOW, &raw);
+	(void)fcntl(ours, F_SETFL, O_NONBLOCK);
 	server->listener = -1;
 	server->line = theirs;
+	server->unit = unit;
 	server->clients[server->client_count++] = ours;
 	server->modbus = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1); /* for its framing alone */
 	server->mapping = new_mapping();
@@ -118,16 +131,38 @@ static int handle(const tactus_modbus_server *server, const uint8_t *pdu, int le
 	return server->registers->write(server->context, address, n, values);
 }
 
+/*
+ * A request of this unit off a serial line, which does not block; 0: not yet. Not libmodbus' own, which after noise, or
+ * a request for another unit, takes what comes next for that one's answer.
+ */
+static int receive_serial(tactus_modbus_server *server, int fd, uint8_t *query)
+{
+	const int64_t now_ns = tactus_clock_ns();
+	if (now_ns - server->heard_ns > SILENCE_NS || server->frame_length == sizeof(server->frame))
+		server->frame_length = 0; /* half a frame, and then nothing more; or no frame at all */
+	server->heard_ns = now_ns;
+	const ssize_t n = read(fd, server->frame + server->frame_length, sizeof(server->frame) - server->frame_length);
+	server->frame_length += n > 0 ? (size_t)n : 0;
+	const size_t length = server->frame_length, least = 8;
+	const size_t whole = length >= least && server->frame[1] == WRITE_MANY ? 9U + server->frame[6] : least;
+	if (length < whole)
+		return 0;
+	server->frame_length = 0;
+	if (server->frame[0] != server->unit || length != whole || tactus_robotiq_checksum(server->frame, length) != 0)
+		return 0; /* whoever sent it asks again */
+	memcpy(query, server->frame, length);
+	return (int)length;
+}
+
 /* False: the client is gone, or what it sends is no Modbus. */
 static bool serve_client(tactus_modbus_server *server, int fd)
 {
 	uint8_t query[MODBUS_MAX_ADU_LENGTH];
 	modbus_set_socket(server->modbus, fd);
-	const int length = modbus_receive(server->modbus, query), header = modbus_get_header_length(server->modbus);
-	if (length < 0 && server->line > 0)
-		modbus_flush(server->modbus); /* noise on the line: whoever sent it asks again */
+	const int header = modbus_get_header_length(server->modbus);
+	const int length = server->line > 0 ? receive_serial(server, fd, query) : modbus_receive(server->modbus, query);
 	if (length < 0)
-		return errno == EINTR || server->line > 0;
+		return errno == EINTR;
 	if (length < header + 5)
 		return length == 0;
 	tactus_emulation_begin(server->world);

@@ -4,7 +4,7 @@
 #include "device/robotiq_frames.h"
 
 /* CRC-16/MODBUS, bit by bit: a hundred frames a second are nothing. */
-static uint16_t checksum(const uint8_t *bytes, size_t n)
+uint16_t tactus_robotiq_checksum(const uint8_t *bytes, size_t n)
 {
 	uint16_t crc = 0xffff;
 	for (size_t i = 0; i < n; i++) {
@@ -50,7 +50,7 @@ bool tactus_robotiq_next(tactus_robotiq_stream *stream, double wrench[6])
 		if (stream->length < TACTUS_ROBOTIQ_FRAME)
 			return false;
 		const uint8_t *b = stream->bytes;
-		const bool good = checksum(b, TACTUS_ROBOTIQ_FRAME - 2) == (uint16_t)(b[14] | b[15] << 8);
+		const bool good = tactus_robotiq_checksum(b, TACTUS_ROBOTIQ_FRAME - 2) == (uint16_t)(b[14] | b[15] << 8);
 		int16_t counts[6];
 		for (int i = 0; i < 6; i++)
 			counts[i] = (int16_t)(uint16_t)(b[2 + 2 * i] | b[3 + 2 * i] << 8);

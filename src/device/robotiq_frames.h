@@ -20,6 +20,8 @@ typedef struct {
 uint8_t *tactus_robotiq_room(tactus_robotiq_stream *stream, size_t *room);
 /* The next whole frame in N and N m: true, or false if more bytes are needed. */
 bool tactus_robotiq_next(tactus_robotiq_stream *stream, double wrench[6]);
+/* CRC-16/MODBUS, as behind a frame's first fourteen bytes. */
+uint16_t tactus_robotiq_checksum(const uint8_t *bytes, size_t n);
 /* Counts to N and N m (1/100 N, 1/1000 N m), as in registers 180 to 185. */
 void tactus_robotiq_wrench(const int16_t counts[6], double wrench[6]);
 
