@@ -6,6 +6,34 @@
 #include "hid_descriptors.h"
 #include "mock_hid.h"
 
+/* ---- allocations of this thread, where no sanitizer counts them ---- */
+
+static _Thread_local unsigned long allocations;
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define ALLOCATIONS_COUNTED true
+extern void *__libc_malloc(size_t size), *__libc_calloc(size_t n, size_t size), *__libc_realloc(void *old, size_t size);
+
+void *malloc(size_t size)
+{
+	allocations++;
+	return __libc_malloc(size);
+}
+
+void *calloc(size_t n, size_t size)
+{
+	allocations++;
+	return __libc_calloc(n, size);
+}
+
+void *realloc(void *old, size_t size)
+{
+	allocations++;
+	return __libc_realloc(old, size);
+}
+#else
+#define ALLOCATIONS_COUNTED false
+#endif
+
 static const double pi = 3.14159265358979323846;
 static const mock_device ffboard = {0x1209, 0xffb0,         "3A0041000F51",         "FFBoard F407VG",
 									"2-1",  ffb_descriptor, sizeof(ffb_descriptor), 0};
@@ -605,6 +633,25 @@ static void torques_become_magnitudes_within_the_limit(void **state)
 	board_free(b);
 }
 
+static void a_step_allocates_nothing(void **state)
+{
+	board *b = board_new(state, &ffboard);
+	tactus_drive *drive = start_drive();
+	tactus_drive_state now;
+	unsigned long during = 0;
+	for (int i = 0; i < 200; i++) {
+		fake_ns += 1000000;
+		controller(b->mock, (int16_t)i);
+		const unsigned long before = allocations;
+		assert_int_equal(tactus_drive_step(drive, 0.01 * i, &now), 0);
+		during += allocations - before;
+	}
+	assert_true(now.reports == 200 && (allocations > 0 || !ALLOCATIONS_COUNTED));
+	assert_int_equal(during, 0);
+	tactus_drive_close(drive);
+	board_free(b);
+}
+
 static void a_torque_that_is_no_number_switches_the_motor_off(void **state)
 {
 	const double torques_Nm[] = {NAN, INFINITY, -INFINITY};
@@ -789,6 +836,7 @@ int main(void)
 		TEST(any_write_that_fails_leaves_the_motor_off),
 		TEST(every_step_of_a_stop_is_tried),
 		TEST(torques_become_magnitudes_within_the_limit),
+		TEST(a_step_allocates_nothing),
 		TEST(a_torque_that_is_no_number_switches_the_motor_off),
 		TEST(the_newest_position_counts),
 		TEST(after_a_pause_that_filled_the_queue_the_position_is_not_fresh),
