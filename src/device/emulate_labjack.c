@@ -427,7 +427,8 @@ static int emulated_open(const emulated_product *product, const char *profile, t
 	emulated_labjack *lj = calloc(1, sizeof(*lj));
 	if (lj == NULL)
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
-	int stream_port = 0;
+	/* where a port is asked for, the stream's is as far from it as 702 from 502 */
+	int stream_port = port > 0 ? port + LABJACK_STREAM_PORT - LABJACK_PORT : 0;
 	*lj = (emulated_labjack){.world = world, .product = product, .analog = product->analog, .stream_client = -1};
 	lj->server = (tactus_modbus_server){.world = world, .registers = &registers, .context = lj, .listener = -1};
 	lj->stream_listener = tactus_emulation_listen(host, &stream_port);

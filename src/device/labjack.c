@@ -13,9 +13,9 @@
 enum { ROUND_TRIPS = 16, ERROR_NOT_RUNNING = 2620 };
 
 static const labjack_product products[] = {
-	{"labjack-t7", "T7", LABJACK_T7, 0x7fffff, 0, 14, 2, {10, 1, 0.1, 0.01}},
+	{"labjack-t7", "T7", LABJACK_T7, 0x7fffff, 0, 14, 2, 100000, {10, 1, 0.1, 0.01}},
 	/* FIO0–3 of a T4 are AIN0–3, the only inputs that reach ±10 V. */
-	{"labjack-t4", "T4", LABJACK_T4, 0xffff0, 0xff0, 4, 2, {10}},
+	{"labjack-t4", "T4", LABJACK_T4, 0xffff0, 0xff0, 4, 2, 50000, {10}},
 };
 
 /* ---- requests ---- */
@@ -369,6 +369,7 @@ static int labjack_start(tactus_device *device, const tactus_scan_settings *sett
 	describe(lj, request_s);
 	code = code < 0 ? code : choose_stream(lj, settings);
 	code = code < 0 ? code : tactus_daq_plan(&lj->daq, device, lj->identity, settings);
+	code = code < 0 || !lj->streams ? code : labjack_stream_check(lj);
 	code = code < 0 ? code : tactus_metadata_set(device->metadata, "acquisition", lj->streams ? "stream" : "requests");
 	if (code < 0)
 		return code;

@@ -15,7 +15,8 @@ typedef struct {
 	uint32_t lines, flexible; /* digital lines; those that may be analog inputs instead */
 	int inputs;               /* that reach ±10 V */
 	int outputs;
-	double ranges_V[4]; /* widest first; 0 past the last */
+	double samples_per_s; /* of a stream, over all that its scan list has */
+	double ranges_V[4];   /* widest first; 0 past the last */
 } labjack_product;
 
 /* A running stream. */
@@ -64,6 +65,8 @@ bool labjack_clipped(const labjack *lj, double volts);
 /* One write for the masked lines of all banks: bit i is line i; `registers` is that of the first bank. */
 int labjack_write_lines(labjack *lj, int registers, uint32_t mask, uint32_t levels);
 
+/* Whether the planned scan can be a stream: TACTUS_ERR_ARGUMENT. Nothing is sent. */
+int labjack_stream_check(labjack *lj);
 /* From a configured device on whose lines are safe and whose source is on. Sets the actual rate. */
 int labjack_stream_start(labjack *lj);
 long labjack_stream_read(labjack *lj, tactus_reading *readings, size_t max);

@@ -30,6 +30,7 @@ enum {
 	LABJACK_STREAM_CLOCK = 4014,
 	LABJACK_STREAM_TARGET = 4016,      /* U32, 1: to the sockets of port 702 */
 	LABJACK_STREAM_SCANS = 4020,       /* U32, 0: without end */
+	LABJACK_STREAM_TRIGGER = 4024,     /* U32, 0: it starts when it is enabled */
 	LABJACK_STREAM_NO_RECOVERY = 4028, /* U32, 1: a full buffer stops the stream */
 	LABJACK_STREAM_LIST = 4100,        /* U32 each: the scan list */
 	LABJACK_STREAM_ENABLE = 4990,      /* U32 */

@@ -75,6 +75,21 @@ static int make_slots(labjack *lj)
 	return TACTUS_OK;
 }
 
+int labjack_stream_check(labjack *lj)
+{
+	const labjack_slots *s = &lj->stream.slots;
+	const int code = make_slots(lj);
+	const double listed = (double)(2 * s->bank_count + s->input_count); /* lines are read and moved */
+	const double rate_Hz = (double)s->count / lj->daq.plan.period_s;
+	if (code >= 0 && rate_Hz * listed > lj->product->samples_per_s)
+		return tactus_fail(
+			TACTUS_ERR_ARGUMENT,
+			"%g scans a second are %g samples a second of the device's stream, which takes %g; at most %.4g",
+			1 / lj->daq.plan.period_s, rate_Hz * listed, lj->product->samples_per_s,
+			lj->product->samples_per_s / listed / (double)s->count);
+	return code;
+}
+
 /* ---- setting up ---- */
 
 static int read_calibration(labjack *lj)
@@ -158,6 +173,17 @@ static size_t packet_samples(const labjack *lj, double rate_Hz)
 	return samples * (size_t)wanted;
 }
 
+/* What somebody may have left behind: clocked or triggered from outside, ended by a full buffer. */
+static int set_plain(labjack *lj)
+{
+	static const int registers[] = {LABJACK_STREAM_CLOCK, LABJACK_STREAM_TRIGGER, LABJACK_STREAM_NO_RECOVERY};
+	int code = labjack_write_u32(lj, LABJACK_STREAM_TARGET, 1);
+	code = code < 0 ? code : labjack_write_u32(lj, LABJACK_STREAM_SCANS, 0);
+	for (size_t i = 0; i < TACTUS_COUNT(registers) && lj->product->id == LABJACK_T7 && code >= 0; i++)
+		code = labjack_write_u32(lj, registers[i], 0); /* a T4 has none of them */
+	return code;
+}
+
 static int set_stream(labjack *lj, double rate_Hz)
 {
 	uint16_t registers[12], rate[2];
@@ -171,8 +197,7 @@ static int set_stream(labjack *lj, double rate_Hz)
 	tactus_modbus_put_u32(registers + 8, lj->resolution <= 8 ? (uint32_t)lj->resolution : 0);
 	tactus_modbus_put_u32(registers + 10, 0); /* buffer: the default */
 	code = code < 0 ? code : labjack_write(lj, LABJACK_STREAM_RATE, TACTUS_COUNT(registers), registers);
-	code = code < 0 ? code : labjack_write_u32(lj, LABJACK_STREAM_TARGET, 1);
-	code = code < 0 ? code : labjack_write_u32(lj, LABJACK_STREAM_SCANS, 0);
+	code = code < 0 ? code : set_plain(lj);
 	code = code < 0 ? code : labjack_read(lj, LABJACK_STREAM_RATE, 2, rate);
 	lj->stream.rate_Hz = code < 0 ? NAN : (double)tactus_modbus_f32(rate);
 	if (code >= 0 && !(fabs(lj->stream.rate_Hz / rate_Hz - 1) < 0.01))

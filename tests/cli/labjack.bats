@@ -25,6 +25,14 @@ teardown() {
 	[ -z "${emulator:-}" ] || end_emulator
 }
 
+# take N: lines of a running scan from descriptor 8, kept in `taken`.
+take() {
+	for _ in $(seq "$1"); do
+		read -r line <&8 || fail "$(cat scan.err)"
+		printf '%s\n' "$line" >>taken
+	done
+}
+
 # registers ADDRESS COUNT TYPE → values, one a line, by mbpoll; write ADDRESS TYPE VALUES…
 registers() { mbpoll -0 -m tcp -p "$port" -a 1 -1 -q -r "$1" -c "$2" -t "$3" ${4:-} 127.0.0.1 | sed -n 's/^\[[0-9]*\]:[ \t]*\([^ ]*\).*/\1/p'; }
 write() { mbpoll -0 -m tcp -p "$port" -a 1 -1 -q -r "$1" -t "$2" -B 127.0.0.1 -- "${@:3}" >/dev/null; }
@@ -187,13 +195,43 @@ calibration() { # sim|labjack FILE
 	for _ in $(seq 45); do read -r line <&8; done
 	end_emulator
 	emulate labjack-t7 --protocol "hold 100N 1h" --listen "127.0.0.1:$port"
-	while ! grep -q "found again" scan.err; do read -r line <&8 || fail "$(cat scan.err)"; done
-	for _ in $(seq 20); do read -r line <&8 || fail "$(cat scan.err)"; done
+	while ! grep -q "found again" scan.err; do take 1; done
+	take 20
 	[[ $line == [0-9]* ]]
 	kill -INT "$scan"
 	cat <&8 >tail.csv
 	wait "$scan" || [ $? -eq 130 ]
 	! grep -q time_s tail.csv
+}
+
+@test "labjack: a stream that broke off goes on in the same file, where the clock is" {
+	emulate labjack-t7 --protocol "hold 100N 1h"
+	end_emulator
+	emulate labjack-t7 --protocol "hold 100N 1h" --listen "127.0.0.1:$port" # the stream's port follows from this one
+	mkfifo records
+	tactus scan "$uri&stream=1" --channels 1-2 --mode dc --rate 20 --settle 5ms --count 100000 --max-lost 100% >records 2>scan.err &
+	scan=$!
+	exec 8<records
+	take 45
+	end_emulator
+	emulate labjack-t7 --protocol "hold 100N 1h" --listen "127.0.0.1:$port"
+	while ! grep -q "found again" scan.err; do take 1; done
+	take 20
+	kill -INT "$scan"
+	cat <&8 >>taken
+	wait "$scan" || [ $? -eq 130 ]
+	exec 8<&-
+	mv taken run.csv
+	[ "$(grep -c '^time_s' run.csv)" -eq 1 ]
+	"$PYTHON" - <<-'EOP'
+		import csv
+		rows = list(csv.DictReader(l for l in open("run.csv") if l[0] != "#"))
+		times, numbers = ([float(r[k]) for r in rows] for k in ("time_s", "sequence"))
+		assert all(a < b for a, b in zip(times, times[1:])) and all(a <= b for a, b in zip(numbers, numbers[1:]))
+		assert any(b > a + 1 for a, b in zip(numbers, numbers[1:])), "no gap"
+		# a scan's number is its time: within the half period by which the device began anew beside the old ticks
+		assert all(abs(t * 20 - n) < 1.5 for t, n in zip(times, numbers))
+	EOP
 }
 
 @test "labjack: --no-reconnect ends with 5 when it goes away" {
@@ -254,9 +292,9 @@ calibration() { # sim|labjack FILE
 	run --separate-stderr tactus scan "$uri&timeout=1s" --count 1
 	status_is 4
 	[ -z "$output" ]
-	for args in "--drive 7V --mode dc" "--channels 9" "--rate 1e5"; do
+	for args in "--drive 7V --mode dc" "--channels 9" "--rate 1e5" "--rate 1kHz --settle 1us"; do
 		emulate labjack-t7
-		run --separate-stderr tactus scan "$uri" $args --count 1
+		run --separate-stderr tactus scan "$uri&stream=1" $args --count 1
 		status_is 2
 		[ "$(registers 2600 1 4)" = 0 ] || fail "$args: something was written"
 		end_emulator
