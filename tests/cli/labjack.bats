@@ -351,13 +351,14 @@ calibration() { # sim|labjack FILE
 	emulate labjack-t7
 	run --separate-stderr tactus emulate labjack-t7 --listen "127.0.0.1:$port"
 	status_is 4
-	for signal in INT TERM; do
-		tactus emulate labjack-t7 >uris &
-		pid=$!
-		until [ -s uris ]; do read -r -t 0.01 <> <(:) || true; done
-		kill -$signal $pid
+	end_emulator
+	for signal in INT:130 TERM:143; do
+		emulate labjack-t7
+		kill "-${signal%:*}" "$emulator"
 		status=0
-		wait $pid || status=$?
-		[ $status -eq $((signal == INT ? 130 : 143)) ] || [ $status -eq $([ $signal = INT ] && echo 130 || echo 143) ]
+		wait "$emulator" || status=$?
+		[ "$status" -eq "${signal#*:}" ]
+		exec 9<&-
+		emulator=
 	done
 }
