@@ -21,6 +21,7 @@ enum { SAMPLES = 8192, FIRST_SAMPLES = 16, BATCH = 256, GAP = 10 }; /* GAP inter
 typedef struct {
 	int64_t at_ns;
 	double force_N;
+	unsigned quality;
 } sample;
 
 struct tactus_reference {
@@ -59,7 +60,7 @@ static void keep(struct tactus_reference *r, const tactus_reading *readings, siz
 				continue;
 			tactus_timing_add(&r->intervals, 1e-9 * (double)(at_ns - before_ns));
 		}
-		r->samples[r->count++ % SAMPLES] = (sample){at_ns, readings[i].force_N};
+		r->samples[r->count++ % SAMPLES] = (sample){at_ns, readings[i].force_N, readings[i].quality};
 	}
 	r->faults = r->device->faults;
 	pthread_cond_broadcast(&r->more);
@@ -229,8 +230,11 @@ void tactus_reference_add_faults(struct tactus_reference *r, tactus_faults *sum)
 
 /* ---- the force beside readings ---- */
 
-/* Linear between the samples around the instant; NaN before the first, after the last and in a gap. */
-static double force_at(const struct tactus_reference *r, int64_t at_ns)
+/*
+ * Linear between the samples around the instant; NaN before the first, after the last and in a gap. What is wrong with
+ * either sample (a scale in motion, an overload) is added to *quality.
+ */
+static double force_at(const struct tactus_reference *r, int64_t at_ns, unsigned *quality)
 {
 	const uint64_t oldest = r->count > SAMPLES ? r->count - SAMPLES : 0;
 	uint64_t i = r->count; /* of the first sample after the instant; readings are young: from the end */
@@ -240,10 +244,12 @@ static double force_at(const struct tactus_reference *r, int64_t at_ns)
 		return NAN;
 	const sample *a = &r->samples[(i - 1) % SAMPLES], *b = &r->samples[i % SAMPLES];
 	if (a->at_ns == at_ns)
-		return a->force_N;
-	if (i == r->count || 1e-9 * (double)(b->at_ns - a->at_ns) > GAP * r->intervals.mean_s)
+		b = a;
+	else if (i == r->count || 1e-9 * (double)(b->at_ns - a->at_ns) > GAP * r->intervals.mean_s)
 		return NAN;
-	return a->force_N + (b->force_N - a->force_N) * (double)(at_ns - a->at_ns) / (double)(b->at_ns - a->at_ns);
+	*quality |= a->quality | b->quality;
+	const double share = a == b ? 0 : (double)(at_ns - a->at_ns) / (double)(b->at_ns - a->at_ns);
+	return a->force_N + (b->force_N - a->force_N) * share;
 }
 
 static int64_t instant_ns(const tactus_device *device, const tactus_reading *reading)
@@ -270,7 +276,7 @@ static size_t deliver(struct tactus_reference *r, const tactus_device *device, s
 {
 	for (size_t i = 0; i < n; i++) {
 		readings[i] = r->pending[i];
-		readings[i].force_N = force_at(r, instant_ns(device, &readings[i]));
+		readings[i].force_N = force_at(r, instant_ns(device, &readings[i]), &readings[i].quality);
 		if (isnan(readings[i].force_N))
 			readings[i].quality |= TACTUS_QUALITY_MISSING;
 	}
