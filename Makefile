@@ -194,6 +194,11 @@ cli-test: all ## the tests of the command line (bats)
 install-test: all ## build C and C++ programs against an installed copy and run them
 	@scripts/run-tests $(BUILD) install
 
+FAULT_SCANS ?= 1000
+.PHONY: faults
+faults: all ## spoil the answers of devices behind Modbus, FAULT_SCANS (1000) scans under each fault
+	@SCANS=$(FAULT_SCANS) scripts/run-tests $(BUILD) faults
+
 .PHONY: blind
 blind: all ## diagnose some two thousand recordings that hide effects and write BLIND.md (an hour)
 	@BUILD=$(BUILD) PYTHONDONTWRITEBYTECODE=1 $${PYTHON:-/usr/bin/python3} tests/blind/run.py --suite full --jobs 2
@@ -210,7 +215,7 @@ bench: ## speed against Miller, pandas, numpy and scipy, written to BENCHMARKS.m
 
 # Loops that the benchmarks call from Python; the static library, because some of them look inside.
 $(BUILD)/bench_loops.so: tests/peers/bench_loops.c $(STATIC)
-	$(call say,LINK)$(CC) $(CPPFLAGS_ALL) -Isrc -std=c17 $(WARN) -O3 -march=native -ffp-contract=off -fPIC -shared $< -o $@ $(STATIC) \
+	$(call say,LINK)$(CC) $(CPPFLAGS_ALL) $(LIB_CFLAGS) -std=c17 $(WARN) -O3 -march=native -ffp-contract=off -fPIC -shared $< -o $@ $(STATIC) \
 		$(LDFLAGS) $(LDLIBS_PRIVATE)
 
 # ---- checking ------------------------------------------------------------------------------------------------------

@@ -456,7 +456,7 @@ static bool worth_repeating(const tactus_modbus *link, int code)
 		   (link->exception == 0 || link->exception == MODBUS_EXCEPTION_SLAVE_OR_SERVER_BUSY);
 }
 
-static int request(tactus_modbus *link, tactus_modbus_request *r, bool again)
+int tactus_modbus_ask(tactus_modbus *link, tactus_modbus_request *r, bool again)
 {
 	const int attempts = again ? 1 + link->options.retries : 1;
 	int code = TACTUS_ERR_DEVICE;
@@ -474,98 +474,7 @@ static int request(tactus_modbus *link, tactus_modbus_request *r, bool again)
 	return code;
 }
 
-static void put_word(tactus_modbus_request *r, unsigned word)
-{
-	r->pdu[r->length++] = (uint8_t)(word >> 8);
-	r->pdu[r->length++] = (uint8_t)word;
-}
-
-static int begin(tactus_modbus_request *r, int function, int address, size_t n, size_t most)
-{
-	if (n == 0 || n > most || address < 0 || (size_t)address + n > 65536)
-		return tactus_fail(TACTUS_ERR_ARGUMENT,
-						   "Modbus function %d: %zu from address %d is not from 1 to %zu below 65536", function, n,
-						   address, most);
-	*r = (tactus_modbus_request){.pdu = {(uint8_t)function}, .length = 1};
-	put_word(r, (unsigned)address);
-	return TACTUS_OK;
-}
-
-/* Where the values of a read's answer are. */
-static const uint8_t *values(const tactus_modbus *link)
+const uint8_t *tactus_modbus_values(const tactus_modbus *link)
 {
 	return link->frame + (link->options.serial ? 3 : 9);
-}
-
-int tactus_modbus_read(tactus_modbus *link, enum tactus_modbus_table table, int address, size_t n, uint16_t *registers)
-{
-	tactus_modbus_request r;
-	const int function =
-		table == TACTUS_MODBUS_INPUT ? MODBUS_FC_READ_INPUT_REGISTERS : MODBUS_FC_READ_HOLDING_REGISTERS;
-	int code = begin(&r, function, address, n, TACTUS_MODBUS_READ_MAX);
-	if (code < 0)
-		return code;
-	put_word(&r, (unsigned)n);
-	code = request(link, &r, true);
-	for (size_t i = 0; i < n && code >= 0; i++)
-		registers[i] = (uint16_t)(values(link)[2 * i] << 8 | values(link)[2 * i + 1]);
-	return code;
-}
-
-int tactus_modbus_read_bits(tactus_modbus *link, enum tactus_modbus_table table, int address, size_t n, uint8_t *bits)
-{
-	tactus_modbus_request r;
-	const int function = table == TACTUS_MODBUS_DISCRETE ? MODBUS_FC_READ_DISCRETE_INPUTS : MODBUS_FC_READ_COILS;
-	int code = begin(&r, function, address, n, TACTUS_MODBUS_READ_BITS_MAX);
-	if (code < 0)
-		return code;
-	put_word(&r, (unsigned)n);
-	code = request(link, &r, true);
-	for (size_t i = 0; i < n && code >= 0; i++)
-		bits[i] = values(link)[i / 8] >> (i % 8) & 1;
-	return code;
-}
-
-int tactus_modbus_write_many(tactus_modbus *link, int address, size_t n, const uint16_t *registers, bool again)
-{
-	tactus_modbus_request r;
-	const int code = begin(&r, MODBUS_FC_WRITE_MULTIPLE_REGISTERS, address, n, TACTUS_MODBUS_WRITE_MAX);
-	if (code < 0)
-		return code;
-	put_word(&r, (unsigned)n);
-	r.pdu[r.length++] = (uint8_t)(2 * n);
-	for (size_t i = 0; i < n; i++)
-		put_word(&r, registers[i]);
-	return request(link, &r, again);
-}
-
-int tactus_modbus_write(tactus_modbus *link, int address, size_t n, const uint16_t *registers, bool again)
-{
-	tactus_modbus_request r;
-	if (n != 1)
-		return tactus_modbus_write_many(link, address, n, registers, again);
-	const int code = begin(&r, MODBUS_FC_WRITE_SINGLE_REGISTER, address, 1, 1);
-	if (code < 0)
-		return code;
-	put_word(&r, registers[0]);
-	return request(link, &r, again);
-}
-
-int tactus_modbus_write_bits(tactus_modbus *link, int address, size_t n, const uint8_t *bits, bool again)
-{
-	tactus_modbus_request r;
-	const int code = begin(&r, n == 1 ? MODBUS_FC_WRITE_SINGLE_COIL : MODBUS_FC_WRITE_MULTIPLE_COILS, address, n,
-						   TACTUS_MODBUS_READ_BITS_MAX - 32);
-	if (code < 0)
-		return code;
-	if (n == 1) {
-		put_word(&r, bits[0] != 0 ? 0xFF00 : 0);
-		return request(link, &r, again);
-	}
-	put_word(&r, (unsigned)n);
-	r.pdu[r.length++] = (uint8_t)((n + 7) / 8);
-	for (size_t i = 0; i < n; i++)
-		r.pdu[r.length + i / 8] |= (uint8_t)((bits[i] != 0) << (i % 8));
-	r.length += (n + 7) / 8;
-	return request(link, &r, again);
 }

@@ -100,6 +100,13 @@ typedef struct {
 	size_t length;
 } tactus_modbus_request;
 
+/*
+ * Between modbus.c and modbus_requests.c: sends a request whose PDU is filled in, again where it may be, and has its
+ * answer; where the values of a read's answer are.
+ */
+int tactus_modbus_ask(tactus_modbus *link, tactus_modbus_request *request, bool again);
+const uint8_t *tactus_modbus_values(const tactus_modbus *link);
+
 enum tactus_modbus_verdict {
 	TACTUS_MODBUS_ANSWER,    /* the one to this request */
 	TACTUS_MODBUS_REFUSAL,   /* an exception reply to this request */

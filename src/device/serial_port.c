@@ -44,7 +44,7 @@ static void climb(char *folder, tactus_serial_identity *identity)
 static void look_up(const char *port, tactus_serial_identity *identity)
 {
 	char link[PATH_MAX], folder[PATH_MAX];
-	snprintf(link, sizeof(link), "/sys/class/tty/%.200s/device", port);
+	snprintf(link, sizeof(link), "/sys/class/tty/%.200s", port);
 	if (realpath(link, folder) != NULL)
 		climb(folder, identity);
 }

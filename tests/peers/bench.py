@@ -15,12 +15,13 @@ import scipy
 import bench_diagnose
 import bench_fit
 import bench_memory
+import bench_modbus
 import bench_stream
 import harness
 
 PARTS = {"convert": bench_stream.convert, "readout": bench_memory.readout, "lockin": bench_memory.lockin,
          "network": bench_fit.network, "curve": bench_fit.curve, "rows": bench_stream.rows,
-         "diagnose": bench_diagnose.diagnose}
+         "diagnose": bench_diagnose.diagnose, "modbus": bench_modbus.modbus}
 
 
 def main():

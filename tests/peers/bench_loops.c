@@ -3,6 +3,8 @@
  * that everybody writes first, and how fast this machine reads memory.
  */
 #include <math.h>
+#include <modbus.h>
+#include <netinet/in.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -71,4 +73,51 @@ int bench_network(size_t n, const double *conductance_S, const double *capacitan
 void bench_network_starts(uint64_t seed, uint64_t stream, size_t starts, double *weights)
 {
 	tactus_network_starts(seed, stream, starts, weights);
+}
+
+/* ---- Modbus on the loopback: a libmodbus server, and what bare libmodbus calls read from it ---- */
+
+int bench_modbus_listen(int *port);
+void bench_modbus_serve(int listener);
+int bench_modbus_read(int port, const int *addresses, const int *counts, size_t requests, size_t scans);
+
+/* The listener, and its port. */
+int bench_modbus_listen(int *port)
+{
+	struct sockaddr_in address;
+	socklen_t size = sizeof(address);
+	modbus_t *context = modbus_new_tcp("127.0.0.1", 0);
+	const int listener = modbus_tcp_listen(context, 4);
+	getsockname(listener, (struct sockaddr *)&address, &size);
+	*port = ntohs(address.sin_port);
+	modbus_free(context);
+	return listener;
+}
+
+/* Answers one client after the other, for ever. */
+void bench_modbus_serve(int listener)
+{
+	uint8_t request[MODBUS_TCP_MAX_ADU_LENGTH];
+	modbus_t *context = modbus_new_tcp("127.0.0.1", 0);
+	modbus_mapping_t *tables = modbus_mapping_new(0, 0, 512, 0);
+	while (modbus_tcp_accept(context, &listener) >= 0) {
+		int n;
+		while ((n = modbus_receive(context, request)) >= 0)
+			modbus_reply(context, request, n, tables);
+		modbus_close(context);
+	}
+}
+
+/* The same requests again and again: 0, or −1 if one failed. */
+int bench_modbus_read(int port, const int *addresses, const int *counts, size_t requests, size_t scans)
+{
+	uint16_t words[MODBUS_MAX_READ_REGISTERS];
+	modbus_t *context = modbus_new_tcp("127.0.0.1", port);
+	int failed = modbus_connect(context);
+	modbus_set_slave(context, 1);
+	for (size_t i = 0; i < scans * requests && failed == 0; i++)
+		failed = modbus_read_registers(context, addresses[i % requests], counts[i % requests], words) < 0 ? -1 : 0;
+	modbus_close(context);
+	modbus_free(context);
+	return failed;
 }
