@@ -224,7 +224,7 @@ static void read_labjack(const uint8_t *data, size_t size)
 			const uint64_t before = slots.number;
 			const long slot = labjack_slots_put(&slots, labjack_packet_sample(data + at, i), &packet);
 			FUZZ_HOLDS(slot >= -1 && slot < 6 && slots.number >= before);
-			const unsigned lines = slots.samples[0] | (slots.samples[1] & 1U) << 8;
+			const unsigned lines = (slots.samples[0] & 0xffU) | (slots.samples[1] & 0xffU) << 8;
 			if (slot >= 0) /* it is what its lines say, whatever was lost before */
 				FUZZ_HOLDS((lines & 0x107) == slots.levels[slot]);
 		}
