@@ -210,13 +210,17 @@ published: all ## error reductions on the simulated bench beside the paper's Tab
 .PHONY: bench
 bench: ## speed against Miller, pandas, numpy and scipy, written to BENCHMARKS.md
 	@scripts/setup --check
-	+@$(parallel) all $(BUILD)/bench_loops.so
+	+@$(parallel) all $(BUILD)/bench_loops.so $(BUILD)/fake_libusb.so
 	@BUILD=$(BUILD) scripts/bench
 
 # Loops that the benchmarks call from Python; the static library, because some of them look inside.
 $(BUILD)/bench_loops.so: tests/peers/bench_loops.c $(STATIC)
 	$(call say,LINK)$(CC) $(CPPFLAGS_ALL) $(LIB_CFLAGS) -std=c17 $(WARN) -O3 -march=native -ffp-contract=off -fPIC -shared $< -o $@ $(STATIC) \
 		$(LDFLAGS) $(LDLIBS_PRIVATE)
+
+# What stands before libusb when a stream at full rate is measured.
+$(BUILD)/fake_libusb.so: tests/peers/fake_libusb.c
+	$(call say,LINK)$(CC) $(CPPFLAGS_ALL) $(PKG_CFLAGS) -std=c17 $(WARN) -O2 -fPIC -shared $< -o $@ -lm
 
 # ---- checking ------------------------------------------------------------------------------------------------------
 

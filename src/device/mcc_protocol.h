@@ -35,14 +35,13 @@ enum { TACTUS_MCC_CALIBRATION_SIZE = 8 * TACTUS_MCC_INPUTS };
 bool tactus_mcc_allowed(unsigned request, bool into);
 
 typedef struct {
-	unsigned product; /* USB product number */
 	const char *name, *profile;
-	unsigned bits;
-	bool simultaneous; /* one converter per input; else inputs are converted in turn */
-	bool has_ranges;
 	double clock_Hz;
 	double input_rate_Hz, total_rate_Hz; /* the most of one input, and of all together */
-	unsigned outputs;
+	unsigned product;                    /* USB product number */
+	unsigned bits, outputs;
+	bool simultaneous; /* one converter per input; else inputs are converted in turn */
+	bool has_ranges;
 } tactus_mcc_product;
 
 /* NULL: not one of ours. */

@@ -11,8 +11,9 @@
 
 size_t tactus_mcc_transfer_bytes(double bytes_per_s)
 {
+	const size_t most = TACTUS_MCC_TRANSFER_MAX / TACTUS_MCC_PACKET;
 	const double packets = ceil(bytes_per_s * TACTUS_MCC_TRANSFER_s / TACTUS_MCC_PACKET);
-	return TACTUS_MCC_PACKET * (size_t)fmin(fmax(packets, 1), TACTUS_MCC_TRANSFER_MAX / TACTUS_MCC_PACKET);
+	return TACTUS_MCC_PACKET * (size_t)fmin(fmax(packets, 1), (double)most);
 }
 
 static void LIBUSB_CALL completed(struct libusb_transfer *transfer)

@@ -17,11 +17,13 @@ import bench_fit
 import bench_memory
 import bench_modbus
 import bench_stream
+import bench_usb
 import harness
 
 PARTS = {"convert": bench_stream.convert, "readout": bench_memory.readout, "lockin": bench_memory.lockin,
          "network": bench_fit.network, "curve": bench_fit.curve, "rows": bench_stream.rows,
-         "diagnose": bench_diagnose.diagnose, "modbus": bench_modbus.modbus}
+         "diagnose": bench_diagnose.diagnose, "modbus": bench_modbus.modbus,
+         "usb": bench_usb.usb}
 
 
 def main():

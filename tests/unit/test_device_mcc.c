@@ -11,14 +11,13 @@ static void test_products_are_those_that_are_known_and_no_others(void **state)
 {
 	(void)state;
 	static const struct {
-		unsigned product;
 		const char *name;
-		unsigned outputs;
-	} known[] = {{0x00ea, "USB-1608FS-Plus", 0},
-				 {0x0113, "USB-201", 0},
-				 {0x0114, "USB-204", 0},
-				 {0x012b, "USB-202", 2},
-				 {0x012c, "USB-205", 2}};
+		unsigned product, outputs;
+	} known[] = {{"USB-1608FS-Plus", 0x00ea, 0},
+				 {"USB-201", 0x0113, 0},
+				 {"USB-204", 0x0114, 0},
+				 {"USB-202", 0x012b, 2},
+				 {"USB-205", 0x012c, 2}};
 	size_t count = 0;
 	for (size_t i = 0; i < COUNT(known); i++) {
 		const tactus_mcc_product *product = tactus_mcc_find_product(known[i].product);
@@ -53,12 +52,11 @@ static void test_the_narrowest_range_that_holds_the_voltage_is_chosen(void **sta
 {
 	(void)state;
 	static const struct {
-		double volts;
+		double volts, full_scale_V;
 		unsigned code;
-		double full_scale_V;
 		bool fits;
-	} cases[] = {{0, 0, 10, true},  {0.5, 5, 1, true}, {1, 5, 1, true},  {1.01, 3, 2, true}, {2, 3, 2, true},
-				 {4.9, 1, 5, true}, {5, 1, 5, true},   {6, 0, 10, true}, {10, 0, 10, true},  {10.1, 0, 10, false}};
+	} cases[] = {{0, 10, 0, true},  {0.5, 1, 5, true}, {1, 1, 5, true},  {1.01, 2, 3, true}, {2, 2, 3, true},
+				 {4.9, 5, 1, true}, {5, 5, 1, true},   {6, 10, 0, true}, {10, 10, 0, true},  {10.1, 10, 0, false}};
 	unsigned code;
 	double full_scale_V;
 	for (size_t i = 0; i < COUNT(cases); i++) {
@@ -136,23 +134,21 @@ static void test_scans_are_recorded_as_the_devices_expect(void **state)
 {
 	(void)state;
 	static const struct {
-		unsigned product;
-		double rate_Hz;
-		unsigned mask;
-		uint32_t count;
+		double rate_Hz, actual_Hz;
 		size_t length;
+		unsigned product, mask;
+		uint32_t count;
 		uint8_t record[12];
-		double actual_Hz;
 	} cases[] = {
 		/* 40 MHz / 1 kHz − 1 = 39999 */
-		{0x00ea, 1e3, 0x0f, 0, 10, {0, 0, 0, 0, 0x3f, 0x9c, 0, 0, 0x0f, 0}, 1e3},
+		{1e3, 1e3, 10, 0x00ea, 0x0f, 0, {0, 0, 0, 0, 0x3f, 0x9c, 0, 0, 0x0f, 0}},
 		/* 40 MHz / 100 kHz − 1 = 399 */
-		{0x00ea, 100e3, 0x81, 0x01020304, 10, {4, 3, 2, 1, 0x8f, 1, 0, 0, 0x81, 0}, 100e3},
+		{100e3, 100e3, 10, 0x00ea, 0x81, 0x01020304, {4, 3, 2, 1, 0x8f, 1, 0, 0, 0x81, 0}},
 		/* 40 MHz / 30 kHz = 1333.3, 1333 ticks are 30007.5 Hz */
-		{0x00ea, 30e3, 0x01, 5, 10, {5, 0, 0, 0, 0x34, 5, 0, 0, 1, 0}, 40e6 / 1333},
+		{30e3, 40e6 / 1333, 10, 0x00ea, 0x01, 5, {5, 0, 0, 0, 0x34, 5, 0, 0, 1, 0}},
 		/* 70 MHz / (50 kHz · 2) − 1 = 699: two inputs in turn */
-		{0x012b, 50e3, 0x05, 16, 12, {16, 0, 0, 0, 0xbb, 2, 0, 0, 5, 0, 0, 0}, 50e3},
-		{0x012c, 500e3, 0x08, 1, 12, {1, 0, 0, 0, 139, 0, 0, 0, 8, 0, 0, 0}, 500e3},
+		{50e3, 50e3, 12, 0x012b, 0x05, 16, {16, 0, 0, 0, 0xbb, 2, 0, 0, 5, 0, 0, 0}},
+		{500e3, 500e3, 12, 0x012c, 0x08, 1, {1, 0, 0, 0, 139, 0, 0, 0, 8, 0, 0, 0}},
 	};
 	for (size_t i = 0; i < COUNT(cases); i++) {
 		const tactus_mcc_product *product = tactus_mcc_find_product(cases[i].product);
@@ -169,12 +165,11 @@ static void test_rates_that_a_device_cannot_do_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
-		unsigned product;
+		unsigned product, mask;
 		double rate_Hz;
-		unsigned mask;
 	} cases[] = {
-		{0x00ea, 100.1e3, 0x01}, {0x00ea, 50.1e3, 0xff}, {0x00ea, 80.1e3, 0x1f}, {0x00ea, 0.009, 0x01},
-		{0x0113, 50.1e3, 0x03},  {0x012c, 251e3, 0x03},  {0x00ea, 1e3, 0},       {0x00ea, NAN, 0x01},
+		{0x00ea, 0x01, 100.1e3}, {0x00ea, 0xff, 50.1e3}, {0x00ea, 0x1f, 80.1e3}, {0x00ea, 0x01, 0.009},
+		{0x0113, 0x03, 50.1e3},  {0x012c, 0x03, 251e3},  {0x00ea, 0, 1e3},       {0x00ea, 0x01, NAN},
 	};
 	tactus_mcc_scan scan;
 	for (size_t i = 0; i < COUNT(cases); i++)

@@ -466,16 +466,16 @@ static void test_every_fault_is_counted_and_none_becomes_a_reading(void **state)
 	static const struct {
 		enum mock_fault fault;
 		unsigned request, times;
+		bool gap;       /* the first scan is lost */
 		size_t counter; /* of tactus_faults */
 		uint64_t counted;
-		bool gap; /* the first scan is lost */
 	} cases[] = {
-		{MOCK_SILENT, 0x10, 1, offsetof(tactus_faults, timeouts), 1, false}, /* asked again */
-		{MOCK_SILENT, 0x10, 2, offsetof(tactus_faults, timeouts), 2, true},
-		{MOCK_SILENT, 0x02, 1, offsetof(tactus_faults, timeouts), 1, false},
-		{MOCK_STALL, 0x10, 1, offsetof(tactus_faults, exceptions), 1, true},
-		{MOCK_STALL, 0x02, 1, offsetof(tactus_faults, exceptions), 1, true},
-		{MOCK_SHORT, 0x10, 1, offsetof(tactus_faults, mismatched), 1, true},
+		{MOCK_SILENT, 0x10, 1, false, offsetof(tactus_faults, timeouts), 1}, /* asked again */
+		{MOCK_SILENT, 0x10, 2, true, offsetof(tactus_faults, timeouts), 2},
+		{MOCK_SILENT, 0x02, 1, false, offsetof(tactus_faults, timeouts), 1},
+		{MOCK_STALL, 0x10, 1, true, offsetof(tactus_faults, exceptions), 1},
+		{MOCK_STALL, 0x02, 1, true, offsetof(tactus_faults, exceptions), 1},
+		{MOCK_SHORT, 0x10, 1, true, offsetof(tactus_faults, mismatched), 1},
 	};
 	for (size_t k = 0; k < COUNT(cases); k++) {
 		mock_usb *usb = mock_new(0x00ea);
