@@ -420,6 +420,8 @@ static int mcc_start(tactus_device *device, const tactus_scan_settings *settings
 	code = write_scan(m, device, identity, settings);
 	if (code < 0) { /* the message is of what went wrong */
 		snprintf(message, sizeof(message), "%s", tactus_error_message());
+		if (m->unswitched) /* a start that was not confirmed may have been heard all the same */
+			(void)tactus_mcc_reset_scan(&m->usb);
 		(void)tactus_daq_safe(&m->daq);
 		return tactus_fail(code, "%s", message);
 	}

@@ -116,7 +116,8 @@ static inline tactus_table *rig_table(const rig_scan *scan, bool raw)
 							tactus_metadata_value(metadata, i));
 	assert_int_equal(tactus_device_table(scan->device, scan->readings, scan->n, raw, table), 0);
 	if (!raw) {
-		assert_int_equal(tactus_converter_new(table, NULL, &converter), 0);
+		if (tactus_converter_new(table, NULL, &converter) < 0)
+			fail_msg("%s", tactus_error_message());
 		assert_int_equal(tactus_converter_block(converter, table), 0);
 		tactus_converter_free(converter);
 	}

@@ -91,6 +91,27 @@ static void test_a_waveform_is_demodulated_without_end(void **state)
 	mock_free(usb);
 }
 
+static void test_a_stream_that_cannot_be_started_is_ended_and_its_switch_opened(void **state)
+{
+	(void)state;
+	mock_usb *usb = mock_new(0x00ea);
+	mock_plug(usb, 1);
+	tactus_device *device = open_bench("09db:00ea", wave_1608, "&stream=50kHz&timeout=10s");
+	const tactus_scan_settings settings = counted(1, first, 1);
+	usb->fault_request = 0x11;
+	usb->fault = MOCK_STALL;
+	usb->faults = 1;
+	assert_int_equal(tactus_device_start(device, &settings), TACTUS_ERR_DEVICE);
+	assert_non_null(strstr(tactus_error_message(), "0x11"));
+	static const mock_exchange sent[] = {
+		LATCH(1), {OUT, 0x11, 0, 0, 10, {0, 0, 0, 0, 0x1f, 3, 0, 0, 0x12, 0}}, STATUS, SCAN_ENDED, LATCH(0)};
+	assert_sent(usb, usb->logged - COUNT(sent), sent, COUNT(sent));
+	assert_int_equal(usb->urb_count, 0); /* no transfer is left behind */
+	start(device, &settings);
+	tactus_device_close(device);
+	mock_free(usb);
+}
+
 /* A ramp: the mean of every reading tells which samples are in it. */
 static double ramp_V(const mock_usb *usb, int input, uint64_t tick)
 {
@@ -363,6 +384,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_a_waveform_is_demodulated_without_end),
+		cmocka_unit_test(test_a_stream_that_cannot_be_started_is_ended_and_its_switch_opened),
 		cmocka_unit_test(test_no_sample_is_lost_or_doubled_between_transfers),
 		cmocka_unit_test(test_a_full_buffer_is_counted_and_the_scan_goes_on_after_a_gap),
 		cmocka_unit_test(test_a_device_that_falls_silent_is_asked_again_then_lost_then_found),
