@@ -54,8 +54,9 @@ void tactus_serial_identify(const char *path, tactus_serial_identity *identity)
 	char real[PATH_MAX];
 	memset(identity, 0, sizeof(*identity));
 	snprintf(identity->path, sizeof(identity->path), "%s", path);
-	/* names in /dev/serial/by-id are links */
-	const char *port = realpath(path, real) != NULL ? strrchr(real, '/') : NULL;
+	/* a port's own name, or a link to it, as those in /dev/serial/by-id are */
+	const char *whole = strncmp(path, "/dev/tty", 8) == 0 ? path : realpath(path, real);
+	const char *port = whole != NULL ? strrchr(whole, '/') : NULL;
 	if (port != NULL)
 		look_up(port + 1, identity);
 }

@@ -4,7 +4,7 @@ import multiprocessing
 
 from harness import BUILD, TACTUS, cpu_seconds, race, seconds
 
-SCANS = 20_000
+SCANS = 10_000
 REGISTERS = 8  # of two words each, one row of eight columns
 
 
