@@ -484,8 +484,12 @@ static void test_an_hour_of_traffic_leaves_memory_and_descriptors_as_they_were(v
 		assert_near(reading.force_N, 1.5, 1e-12);
 	}
 	assert_int_equal(open_files(), files);
-	/* 256 KiB of play for the other thread and the allocator; a leak of 8 bytes a scan would be more */
-	assert_true(resident_pages() - pages <= 64);
+	/* 250 KiB of play for the other thread and the allocator; a leak of 8 bytes a scan would be more */
+	const long grown = resident_pages() - pages;
+#ifndef __SANITIZE_ADDRESS__ /* which keeps what is freed, and says itself what is not */
+	assert_true(grown <= 62);
+#endif
+	(void)grown;
 	assert_int_equal(tactus_device_faults(device).timeouts, 0);
 	tactus_device_close(device);
 	rig_remove(path);
