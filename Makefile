@@ -199,6 +199,26 @@ FAULT_SCANS ?= 1000
 faults: all ## spoil the answers of devices behind Modbus, FAULT_SCANS (1000) scans under each fault
 	@SCANS=$(FAULT_SCANS) scripts/run-tests $(BUILD) faults
 
+# The rig's programs look at the USB and HID libraries alone, not at ours.
+RIG_C := $(wildcard tests/rig/*.c)
+RIG := $(addprefix $(BUILD)/rig/,virtual_usb virtual_hid test_usb test_hid)
+RIG_LIBS = $(shell pkg-config --cflags --libs libusb-1.0 hidapi-hidraw)
+.PHONY: rig
+rig: ## the real programs in a virtual machine, with virtual devices on its USB and HID stacks
+	@scripts/setup --rig
+	+@$(parallel) all rig-programs
+	@scripts/rig $(BUILD)
+
+.PHONY: rig-programs
+rig-programs: $(RIG)
+
+$(BUILD)/rig/virtual_usb: tests/rig/virtual_usb.c tests/rig/usbip.c tests/rig/rig.c
+$(BUILD)/rig/virtual_hid: tests/rig/virtual_hid.c tests/rig/virtual_scale.c tests/rig/virtual_motor.c tests/rig/rig.c
+$(BUILD)/rig/test_usb $(BUILD)/rig/test_hid: $(BUILD)/rig/test_%: tests/rig/test_%.c tests/rig/rig.c
+$(RIG): $(wildcard tests/rig/*.h)
+	@mkdir -p $(@D)
+	$(call say,RIG)$(CC) $(CPPFLAGS_ALL) $(CFLAGS_ALL) $(filter %.c,$^) -o $@ $(LDFLAGS) $(RIG_LIBS) -lcmocka -lm
+
 .PHONY: blind
 blind: all ## diagnose some two thousand recordings that hide effects and write BLIND.md (an hour)
 	@BUILD=$(BUILD) PYTHONDONTWRITEBYTECODE=1 $${PYTHON:-/usr/bin/python3} tests/blind/run.py --suite full --jobs 2
@@ -224,10 +244,10 @@ $(BUILD)/fake_libusb.so: tests/peers/fake_libusb.c
 
 # ---- checking ------------------------------------------------------------------------------------------------------
 
-SOURCES_C := $(LIB_C) $(CLI_C) $(UNIT_C) $(wildcard tests/install/*.c tests/peers/*.c tests/fuzz/*.c)
+SOURCES_C := $(LIB_C) $(CLI_C) $(UNIT_C) $(RIG_C) $(wildcard tests/install/*.c tests/peers/*.c tests/fuzz/*.c)
 SOURCES := $(SOURCES_C) $(LIB_CXX) $(HEADERS) \
 	$(wildcard cli/*.h src/*/*.h src/*/*/*.h src/*/*/*/*.h tests/*/*.h tests/*/*.cpp)
-SCRIPTS := $(shell grep -lE '^\#!/bin/(ba)?sh|^\#!/usr/bin/env bash' scripts/* .ci/run 2>/dev/null)
+SCRIPTS := $(shell grep -lE '^\#!/bin/(ba)?sh|^\#!/usr/bin/env bash' scripts/* tests/rig/*.sh .ci/run 2>/dev/null)
 
 .PHONY: check
 check: ## formatting, clang-tidy, cppcheck, shellcheck, headers; any finding is an error
