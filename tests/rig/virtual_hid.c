@@ -73,9 +73,13 @@ static void answer_get(virtual_hid *device, const struct uhid_get_report_req *re
 {
 	struct uhid_event event = {.type = UHID_GET_REPORT_REPLY, .u.get_report_reply.id = request->id};
 	struct uhid_get_report_reply_req *reply = &event.u.get_report_reply;
-	bool feature = request->rtype == UHID_FEATURE_REPORT && device->kind->get_feature != NULL;
+	size_t (*get)(virtual_hid *, uint8_t *) = NULL;
+	if (request->rtype == UHID_FEATURE_REPORT)
+		get = device->kind->get_feature;
+	else if (request->rtype == UHID_INPUT_REPORT)
+		get = device->kind->get_input;
 	reply->data[0] = request->rnum;
-	reply->size = (uint16_t)(feature ? device->kind->get_feature(device, reply->data) : 0);
+	reply->size = (uint16_t)(get != NULL ? get(device, reply->data) : 0);
 	reply->err = reply->size > 0 ? 0 : EIO;
 	send_event(device, &event, sizeof(*reply));
 }

@@ -19,7 +19,11 @@ typedef struct {
 	void (*closed)(virtual_hid *device);
 	/* A report that a program wrote, its number first; NULL: none is expected. */
 	void (*output)(virtual_hid *device, const uint8_t *report, size_t n);
-	/* Feature reports, their number first: the length, or 0 for one that there is not; NULL: there are none. */
+	/*
+	 * A host asks for reports or sets them, their number first: the length, or 0 for one that there is not; NULL: there
+	 * are none.
+	 */
+	size_t (*get_input)(virtual_hid *device, uint8_t *report);
 	size_t (*get_feature)(virtual_hid *device, uint8_t *report);
 	size_t (*set_feature)(virtual_hid *device, const uint8_t *report, size_t n);
 	/* Called every millisecond while a program has it open. */

@@ -37,6 +37,7 @@ static struct {
 	size_t unit;
 	int status; /* forced; 0: as the weight says */
 	int motion; /* reports until a new weight is stable */
+	int quiet;  /* it sends changes alone */
 	uint8_t last[REPORT_SIZE];
 	int64_t due_ns;
 	unsigned long reports;
@@ -90,12 +91,25 @@ static void tick(virtual_hid *device, int64_t now_ns)
 {
 	if (now_ns < scale.due_ns)
 		return;
+	uint8_t before[REPORT_SIZE];
+	memcpy(before, scale.last, sizeof(before));
 	scale.due_ns = now_ns + INTERVAL_ns;
 	form_report();
-	send_report(device);
+	if (scale.quiet == 0 || memcmp(before, scale.last, sizeof(before)) != 0)
+		send_report(device);
 }
 
-/* weight GRAM, unit g|kg|oz|lb, status N (0: as the weight says), state */
+static size_t get_input(virtual_hid *device, uint8_t *report)
+{
+	(void)device;
+	if (report[0] != REPORT)
+		return 0;
+	form_report();
+	memcpy(report, scale.last, sizeof(scale.last));
+	return sizeof(scale.last);
+}
+
+/* weight GRAM, unit g|kg|oz|lb, status N (0: as the weight says), quiet 0|1, state */
 static bool obey(virtual_hid *device, const char *command, char *answer, size_t size)
 {
 	char name[8];
@@ -103,7 +117,7 @@ static bool obey(virtual_hid *device, const char *command, char *answer, size_t 
 		scale.motion = 2;
 		return true;
 	}
-	if (sscanf(command, "status %d", &scale.status) == 1)
+	if (sscanf(command, "status %d", &scale.status) == 1 || sscanf(command, "quiet %d", &scale.quiet) == 1)
 		return true;
 	if (strcmp(command, "state") == 0) {
 		snprintf(answer, size, "plugged=%d open=%d reports=%lu weight=%g", device->fd >= 0, device->open, scale.reports,
@@ -130,6 +144,7 @@ const virtual_hid_kind virtual_scale = {
 	.descriptor_size = sizeof(descriptor),
 	.opened = opened,
 	.closed = closed,
+	.get_input = get_input,
 	.tick = tick,
 	.obey = obey,
 };
