@@ -1,44 +1,7 @@
 #!/bin/sh
-# The real program against the virtual devices, on the kernel's USB and HID stacks. TAP on standard output.
-# shellcheck disable=SC2016  # the dollars in single quotes are awk's
-# Every function called test_… below is one test: it runs in its own folder and shell, and fails where a command fails.
-
-hid() { virtual_hid tell "$@"; }
-usb() { virtual_usb tell "$@"; }
-
-# Waits until a command succeeds, at most 15 s.
-await() {
-	n=0
-	until "$@"; do
-		n=$((n + 1))
-		[ $n -lt 150 ] || { echo "in vain: $*"; return 1; }
-		usleep 100000
-	done
-}
-
-# exits STATUS COMMAND…: the command ends with that status; its output is in the files out and err.
-exits() {
-	wanted=$1
-	shift
-	status=0
-	timeout 60 "$@" >out 2>err || status=$?
-	[ $status -eq "$wanted" ] || { echo "status $status: $*"; cat err; return 1; }
-}
-
-# The rows of a recording, without comments and header; its columns by name as awk's variables.
-rows() { # FILE AWK-PROGRAM
-	awk -F, "/^#/ { next } !seen++ { for (i = 1; i <= NF; i++) at[\$i] = i; next } $2" "$1"
-}
-count_rows() { rows "$1" '{ n++ } END { print n + 0 }'; }
-has_rows() { [ -s "$1" ] && [ "$(count_rows "$1")" -ge "$2" ]; }
-
-# Waits for the program in the background, whose standard error is in the file err.
-ends_with() { # STATUS
-	status=0
-	wait "$pid" || status=$?
-	cat err
-	[ $status -eq "$1" ] || { echo "status $status, not $1"; return 1; }
-}
+# The real program scans a virtual USB scale on the kernel's HID stack.
+# shellcheck source=tests/rig/suite.sh disable=SC2016,SC2317 # the dollars in single quotes are awk's; run_tests calls them
+. /rig/suite.sh
 
 # ---- listing and selecting ----
 
@@ -100,7 +63,7 @@ test_an_unplugged_scale_is_found_again_in_the_same_file() {
 	hid scale plug
 	known=$(count_rows run.csv)
 	await has_rows run.csv $((known + 3))
-	ends_with 0
+	ends_with $pid 0
 	[ "$(grep -c '^time_s,' run.csv)" -eq 1 ]
 	rows run.csv '$at["sequence"] <= last && n++ { bad = 1 } { last = $at["sequence"]; t = $at["time_s"] }
 		t - before > 1 && before { gap = 1 } { before = t } END { exit !(gap && !bad) }'
@@ -113,7 +76,7 @@ test_no_reconnect_ends_with_status_5() {
 	pid=$!
 	await has_rows run.csv 2
 	hid scale unplug
-	ends_with 5
+	ends_with $pid 5
 	hid scale plug
 }
 
@@ -122,7 +85,7 @@ test_a_signal_ends_a_scan_with_a_whole_file() {
 	pid=$!
 	await has_rows run.csv 2
 	kill -INT "$pid"
-	ends_with 130
+	ends_with $pid 130
 	[ "$(tail -c 1 run.csv | od -An -tx1 | tr -d ' ')" = 0a ]
 }
 
@@ -139,27 +102,4 @@ test_a_permission_problem_prints_a_remedy_that_helps() {
 	exits 0 su user -c 'tactus scan hid:scale --count 1'
 }
 
-# ---- running them ----
-
-tests=$(sed -n 's/^\(test_[a-z0-9_]*\)() {$/\1/p' "$0")
-[ $# -eq 0 ] || tests=$*
-echo "1..$(echo "$tests" | wc -w)"
-number=0
-for t in $tests; do
-	number=$((number + 1))
-	mkdir -p "/tmp/$t"
-	chmod 777 "/tmp/$t"
-	cd "/tmp/$t" || exit 1
-	(
-		set -e
-		"$t"
-	) >log 2>&1
-	status=$?
-	if [ $status -eq 0 ]; then
-		echo "ok $number - ${t#test_}"
-	else
-		echo "not ok $number - ${t#test_}"
-		sed 's/^/# /' log
-		echo "# status $status"
-	fi
-done
+run_tests "$0" "$@"
