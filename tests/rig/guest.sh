@@ -31,7 +31,7 @@ start() { # PROGRAM: in the background, until its socket is there
 }
 
 run_suite() {
-	timeout 100 "$1" >"/out/$1.tap" 2>"/out/$1.err" </dev/null
+	timeout 240 "$1" >"/out/$1.tap" 2>"/out/$1.err" </dev/null
 	echo $? >"/out/$1.status"
 	say "$1 ended with status $(cat "/out/$1.status")"
 }

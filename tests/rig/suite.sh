@@ -39,6 +39,12 @@ ends_with() { # PID STATUS
 	[ $status -eq "$2" ] || { echo "status $status, not $2"; return 1; }
 }
 
+# Ends a scan in the background as a user does.
+interrupt() { # PID
+	kill -INT "$1"
+	ends_with "$1" 130
+}
+
 run_tests() { # SUITE [TEST…]
 	tests=$(sed -n 's/^\(test_[a-z0-9_]*\)() {$/\1/p' "$1")
 	shift

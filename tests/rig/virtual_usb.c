@@ -44,8 +44,8 @@ typedef struct {
 } scan_state;
 
 typedef struct {
-	/* the bench: a source, eight resistive sensors each behind a switch, an inverting amplifier on channel 0 */
-	double source_V, feedback_ohm, resistance_ohm[SENSORS];
+	/* the bench of Paredes-Madrid 2010, fig. 7: eight resistive sensors behind switches, an inverting amplifier */
+	double dc_source_V, ac_source_V, feedback_ohm, switch_ohm, resistance_ohm[SENSORS];
 	/* the device */
 	char serial[9];
 	uint8_t tristate, latch, ranges[CHANNELS], calibration[CALIBRATION_SIZE];
@@ -66,19 +66,33 @@ typedef struct {
 /* ---- the bench and the converter ---- */
 
 /* A switch is closed when its line is an output and latched high; closed ones are in parallel. */
-static double amplifier_V(const daq *d)
+static double closed_conductance_S(const daq *d)
 {
 	double conductance_S = 0;
 	for (int k = 0; k < SENSORS; k++)
 		if ((d->latch & ~d->tristate & 1 << k) != 0)
-			conductance_S += 1 / d->resistance_ohm[k];
-	return -d->source_V * d->feedback_ohm * conductance_S;
+			conductance_S += 1 / (d->resistance_ohm[k] + d->switch_ohm);
+	return conductance_S;
 }
 
-/* The other channels have constant voltages, each another one. */
+/*
+ * Detectors of the AC amplitude on input 0 (the mean of the rectified wave: 2/π of its peak), of the phase on input 1
+ * (none: the sensors are resistors), of DC on input 2. The others have constant voltages, each another one.
+ */
 static double input_V(const daq *d, int channel)
 {
-	return channel == 0 ? amplifier_V(d) : 0.25 * channel - 1;
+	static const double MEAN_OF_PEAK = 0.63661977236758134;
+	double gain = d->feedback_ohm * closed_conductance_S(d);
+	switch (channel) {
+	case 0:
+		return d->ac_source_V * gain * MEAN_OF_PEAK;
+	case 1:
+		return 0;
+	case 2:
+		return -d->dc_source_V * gain;
+	default:
+		return 0.25 * channel - 1;
+	}
 }
 
 /* Full scale of a range code, 0: there is no such range. */
@@ -408,7 +422,7 @@ static void describe(const daq *d, char *answer, size_t size)
 }
 
 /*
- * plug, unplug, state, quit; serial TEXT (before a plug); source VOLTS, feedback OHM, sensor INDEX OHM;
+ * plug, unplug, state, quit; serial TEXT (before a plug); sensor INDEX OHM;
  * refuse N, ignore N: the next N vendor requests stall, or get no answer; hold 0|1: bulk gets no answer; overrun.
  */
 static void obey(void *context, char *command, char *answer, size_t size)
@@ -434,10 +448,6 @@ static void obey(void *context, char *command, char *answer, size_t size)
 		d->ignore_requests = n;
 	} else if (sscanf(command, "hold %u", &on) == 1) {
 		d->hold_bulk = on != 0;
-	} else if (sscanf(command, "source %lf", &value) == 1) {
-		d->source_V = value;
-	} else if (sscanf(command, "feedback %lf", &value) == 1) {
-		d->feedback_ohm = value;
 	} else if (sscanf(command, "sensor %u %lf", &n, &value) == 2 && n < SENSORS) {
 		d->resistance_ohm[n] = value;
 	} else if (sscanf(command, "serial %8s", d->serial) != 1) {
@@ -467,8 +477,10 @@ int main(int argc, char **argv)
 {
 	if (argc > 1 && strcmp(argv[1], "tell") == 0)
 		return rig_tell_words(RIG_USB, argv + 2, argc - 2);
-	static daq d = {.source_V = 1,
-					.feedback_ohm = 10e3,
+	static daq d = {.dc_source_V = -5,
+					.ac_source_V = 3,
+					.feedback_ohm = 1800,
+					.switch_ohm = 78,
 					.resistance_ohm = {2e3, 4.7e3, 10e3, 22e3, 47e3, 100e3, 220e3, 470e3},
 					.serial = "01A2B3C4",
 					.plug = {.fd = -1}};
