@@ -199,9 +199,9 @@ FAULT_SCANS ?= 1000
 faults: all ## spoil the answers of devices behind Modbus, FAULT_SCANS (1000) scans under each fault
 	@SCANS=$(FAULT_SCANS) scripts/run-tests $(BUILD) faults
 
-# The rig's programs look at the USB and HID libraries alone, not at ours.
+# Of the rig's programs one uses our library, as installed programs do; the others look at USB and HID without it.
 RIG_C := $(wildcard tests/rig/*.c)
-RIG := $(addprefix $(BUILD)/rig/,virtual_usb virtual_hid test_usb test_hid)
+RIG := $(addprefix $(BUILD)/rig/,virtual_usb virtual_hid test_usb test_hid turn_motor)
 RIG_LIBS = $(shell pkg-config --cflags --libs libusb-1.0 hidapi-hidraw)
 .PHONY: rig
 rig: ## the real programs in a virtual machine, with virtual devices on its USB and HID stacks
@@ -215,6 +215,8 @@ rig-programs: $(RIG)
 $(BUILD)/rig/virtual_usb: tests/rig/virtual_usb.c tests/rig/usbip.c tests/rig/rig.c
 $(BUILD)/rig/virtual_hid: tests/rig/virtual_hid.c tests/rig/virtual_scale.c tests/rig/virtual_motor.c tests/rig/rig.c
 $(BUILD)/rig/test_usb $(BUILD)/rig/test_hid: $(BUILD)/rig/test_%: tests/rig/test_%.c tests/rig/rig.c
+$(BUILD)/rig/turn_motor: tests/rig/turn_motor.c $(HEADERS) $(SHARED)
+$(BUILD)/rig/turn_motor: RIG_LIBS = -L$(BUILD) -ltactus -Wl,-rpath,'$$ORIGIN'
 $(RIG): $(wildcard tests/rig/*.h)
 	@mkdir -p $(@D)
 	$(call say,RIG)$(CC) $(CPPFLAGS_ALL) $(CFLAGS_ALL) $(filter %.c,$^) -o $@ $(LDFLAGS) $(RIG_LIBS) -lcmocka -lm

@@ -68,7 +68,8 @@ test_an_unplugged_scale_is_found_again_in_the_same_file() {
 	rows run.csv '$at["sequence"] <= last && n++ { bad = 1 } { last = $at["sequence"]; t = $at["time_s"] }
 		t - before > 1 && before { gap = 1 } { before = t } END { exit !(gap && !bad) }'
 	[ "$(wc -l <err)" -le 4 ] # gone, found again, faults, lost scans
-	echo "$before $after" | awk '{ used = $3 + $4 - $1 - $2; print used " of 200 ticks"; exit used > 10 }'
+	# One that spins would have all 200; emulation and a busy host make a few percent some ten.
+	echo "$before $after" | awk '{ used = $3 + $4 - $1 - $2; print used " of 200 ticks"; exit used > 80 }'
 }
 
 test_no_reconnect_ends_with_status_5() {

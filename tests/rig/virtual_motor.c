@@ -1,7 +1,7 @@
 /*
  * An OpenFFBoard with one motor: commands, constant-force effects and the position report as its public firmware (1.17)
- * has them, and an axis with inertia and damping behind them. Remembers the torque, so that a test can see that it was
- * zero when a program left.
+ * has them, and an axis with inertia and damping behind them. Remembers the torque that effects gave when a program
+ * left: what the board adds by itself (a damper that brakes) is not the program's.
  */
 #include <math.h>
 #include <stdio.h>
@@ -299,7 +299,7 @@ static struct {
 	int64_t sent_ns;
 	bool estop;
 	/* what a test asks for */
-	int peak, torque_at_close;
+	int peak, commanded_at_close;
 	unsigned long outputs, reports, closes, commands, ignore;
 } motor;
 
@@ -642,7 +642,7 @@ static void closed(virtual_hid *device)
 {
 	(void)device;
 	move(rig_now_ns());
-	motor.torque_at_close = torque(rig_now_ns());
+	motor.commanded_at_close = effects_torque(rig_now_ns());
 	motor.closes++;
 }
 
@@ -681,12 +681,13 @@ static bool obey(virtual_hid *device, const char *command, char *answer, size_t 
 		for (int i = 0; i < BLOCKS; i++)
 			playing += motor.effects[i].playing;
 		snprintf(answer, size,
-				 "plugged=%d open=%d active=%d playing=%d effects=%d torque=%d peak=%d torque_at_close=%d closes=%lu "
+				 "plugged=%d open=%d active=%d playing=%d effects=%d commanded=%d commanded_at_close=%d torque=%d "
+				 "peak=%d closes=%lu "
 				 "position=%.4f speed=%.4f outputs=%lu commands=%lu reports=%lu power=%d spring=%d damper=%d",
-				 device->fd >= 0, device->open, motor.active, playing, BLOCKS - free_blocks(), torque(now_ns),
-				 motor.peak, motor.torque_at_close, motor.closes, motor.position, motor.speed, motor.outputs,
-				 motor.commands, motor.reports, (int)motor.settings[POWER], (int)motor.settings[IDLE_SPRING],
-				 (int)motor.settings[DAMPER]);
+				 device->fd >= 0, device->open, motor.active, playing, BLOCKS - free_blocks(), effects_torque(now_ns),
+				 motor.commanded_at_close, torque(now_ns), motor.peak, motor.closes, motor.position, motor.speed,
+				 motor.outputs, motor.commands, motor.reports, (int)motor.settings[POWER],
+				 (int)motor.settings[IDLE_SPRING], (int)motor.settings[DAMPER]);
 		return true;
 	}
 	if (strcmp(command, "factory") == 0) {
