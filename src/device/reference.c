@@ -281,7 +281,8 @@ static size_t deliver(struct tactus_reference *r, const tactus_device *device, s
 			readings[i].quality |= TACTUS_QUALITY_MISSING;
 	}
 	r->held -= n;
-	memmove(r->pending, r->pending + n, r->held * sizeof(*r->pending));
+	if (n > 0) /* nothing is pending before the first reading */
+		memmove(r->pending, r->pending + n, r->held * sizeof(*r->pending));
 	return n;
 }
 
