@@ -67,5 +67,7 @@ int tactus_modbus_options_read(tactus_uri *uri, tactus_modbus_options *o)
 	code = code < 0 ? code : tactus_uri_quantity(uri, "timeout", "s", &o->timeout_s);
 	o->unit = (int)unit;
 	o->retries = (int)retries;
+	if (code >= 0 && o->serial && (o->unit < 1 || o->unit > 247)) /* as a profile may have it */
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "%s: on a serial line a unit is a number from 1 to 247", uri->scheme);
 	return code;
 }

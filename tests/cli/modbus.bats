@@ -194,7 +194,7 @@ find_pymodbus() {
 	local venv=${BUILD:-$root/build}/pymodbus-3.6.9
 	if ! "$venv/bin/python" -c 'import pymodbus, serial' 2>/dev/null; then
 		python3 -m venv "$venv" >/dev/null 2>&1 &&
-			"$venv/bin/pip" install -q --disable-pip-version-check pymodbus==3.6.9 pyserial==3.5 >/dev/null 2>&1 || true
+			"$venv/bin/pip" install -q --disable-pip-version-check --timeout 5 --retries 1 pymodbus==3.6.9 pyserial==3.5 >/dev/null 2>&1 || true
 	fi
 	for pymodbus in "$venv/bin/python" "$PYTHON"; do
 		if "$pymodbus" -c 'import pymodbus, serial' 2>/dev/null; then return 0; fi
@@ -202,49 +202,7 @@ find_pymodbus() {
 	skip "PYMODBUS COULD NOT BE HAD: OUR CLIENT IS NOT TRIED AGAINST IT"
 }
 
-plant_profile() {
-	cat >plant.toml <<-'EOP'
-		kind = "profile"
-		driver = "registers"
-		first_address = 1 # as the plant's manual counts
-		[link]
-		timeout_s = 5
-		[[identity]]
-		name = "plant_model"
-		address = 6
-		equals = 1005
-		[[register]]
-		address = 21
-		type = "f32"
-		order = "CDAB"
-		column = "displacement_um"
-		[[register]]
-		address = 8
-		table = "input"
-		scale = 0.5
-		offset = -1
-		column = "pressure_Pa"
-		[[register]]
-		table = "coil"
-		address = 7
-		column = "pump"
-		[[register]]
-		table = "discrete"
-		address = 8
-		column = "door"
-		[[start]]
-		address = 31
-		type = "f32"
-		value = -1
-		[[start]]
-		address = 40
-		value = 7
-		[[stop]]
-		table = "coil"
-		address = 2
-		value = 1
-	EOP
-}
+plant_profile() { cp "$examples/profile-plant.toml" plant.toml; }
 
 check_plant() {
 	[ "$(column displacement_um <plant.csv | sort -u)" = 100.5 ]

@@ -1,5 +1,8 @@
 /* The Modbus link against peers that misbehave by a script: what is counted, what is repeated, what is never believed.
  */
+#include <signal.h>
+#include <sys/time.h>
+
 #include "modbus_peer.h"
 
 /* A read of three registers while the peer does what the script says: what it returns, and the faults it counts. */
@@ -223,6 +226,56 @@ static void test_a_serial_line_that_hangs_up_is_lost(void **state)
 	tactus_modbus_close(link);
 }
 
+static volatile sig_atomic_t signals;
+
+static void count_signal(int number)
+{
+	(void)number;
+	signals = signals + 1;
+}
+
+/* Signals come all the time: an answer is believed all the same, no answer is reported as the interruption that it may
+ * be, and the link goes on. */
+static void test_signals_do_not_tear_an_answer(void **state)
+{
+	(void)state;
+	static const enum peer_act acts[] = {ANSWER, SILENCE, ANSWER, HALF, ANSWER};
+	static const enum peer_act probed[] = {ANSWER, SILENCE, ANSWER, ANSWER, HALF}; /* a probe before the third */
+	static const int codes[] = {0, TACTUS_ERR_INTERRUPTED, 0, TACTUS_ERR_DEVICE, 0};
+	const struct sigaction action = {.sa_handler = count_signal};
+	const struct itimerval often = {{0, 5000}, {0, 5000}}, never = {{0, 0}, {0, 0}};
+	sigset_t alarm;
+	sigemptyset(&alarm);
+	sigaddset(&alarm, SIGALRM);
+	for (int serial = 0; serial < 2; serial++) {
+		peer p = {.serial = serial != 0, .acts = serial ? probed : acts, .count = COUNT(acts)};
+		tactus_faults faults;
+		uint16_t registers[3];
+		sigaction(SIGALRM, &action, NULL);
+		pthread_sigmask(SIG_BLOCK, &alarm, NULL); /* not in the peer's thread */
+		peer_start(&p);
+		tactus_modbus *link = connect_to(&p, 0, &faults);
+		pthread_sigmask(SIG_UNBLOCK, &alarm, NULL);
+		setitimer(ITIMER_REAL, &often, NULL);
+		for (size_t i = 0; i < COUNT(acts); i++) {
+			const unsigned before = p.requests;
+			int code;
+			do /* a line that waits for silence may be interrupted before it asks */
+				code = tactus_modbus_read(link, TACTUS_MODBUS_HOLDING, 10 * (int)i, 3, registers);
+			while (code == TACTUS_ERR_INTERRUPTED && (codes[i] == 0 || p.requests == before));
+			if (code != codes[i] && !(code == TACTUS_ERR_INTERRUPTED && codes[i] == TACTUS_ERR_DEVICE))
+				fail_msg("request %zu (%s): %d, %s", i, serial ? "RTU" : "TCP", code, tactus_error_message());
+			if (code == 0)
+				check_registers(registers, 10 * (int)i, 3);
+		}
+		setitimer(ITIMER_REAL, &never, NULL);
+		assert_true(signals > 0);
+		tactus_modbus_close(link);
+		peer_stop(&p);
+	}
+	signal(SIGALRM, SIG_DFL);
+}
+
 static void test_options_are_checked_before_anything_is_opened(void **state)
 {
 	(void)state;
@@ -266,6 +319,7 @@ int main(void)
 		cmocka_unit_test(test_bits_are_read_and_written_in_order),
 		cmocka_unit_test(test_a_lost_link_is_lost_until_it_is_opened_again),
 		cmocka_unit_test(test_a_serial_line_that_hangs_up_is_lost),
+		cmocka_unit_test(test_signals_do_not_tear_an_answer),
 		cmocka_unit_test(test_options_are_checked_before_anything_is_opened),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
