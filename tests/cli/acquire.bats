@@ -89,7 +89,7 @@ columns() { grep -v '^#' | head -1; }
 }
 
 @test "scan: a device that is not there is status 4, and no header was written" {
-	for uri in sim:nosuch sim:nosuch.toml nosuch: usb:dead:beef modbus-tcp://x replay:nosuch.csv; do
+	for uri in sim:nosuch sim:nosuch.toml nosuch: usb:dead:beef 'modbus-tcp://127.0.0.1:1?profile=labjack-t7' replay:nosuch.csv; do
 		# A file that a URI names and cannot be read is bad input.
 		run --separate-stderr tactus scan "$uri" -o out.csv
 		[ "$status" -eq 4 ] || { [[ $uri == *nosuch.* ]] && [ "$status" -eq 3 ]; } || fail "$uri: status $status"

@@ -4,13 +4,13 @@ load common
 
 model=$examples/model-forward.toml
 
-@test "devices: the two built-in benches, as lines and as JSON, and every URI opens" {
+@test "devices: the two built-in benches, as lines and as JSON, and their URIs open" {
 	run --separate-stderr tactus devices
 	status_is 0
 	prints "sim:paredes"
 	prints "sim:lebosse"
 	tactus devices --json >devices.json
-	for uri in $(jq -r '.devices[].uri' devices.json); do
+	for uri in $(jq -r '.devices[].uri | select(startswith("sim:"))' devices.json); do # not what is plugged in here
 		tactus scan "$uri" --count 1 >/dev/null
 	done
 	[ "$(jq '.devices | length' devices.json)" -eq "$(tactus devices | wc -l)" ]

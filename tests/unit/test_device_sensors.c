@@ -47,7 +47,8 @@ static void test_an_effect_acts_and_the_recording_does_not_name_it(void **state)
 	const tactus_metadata *a = tactus_device_metadata(scan.device), *b = tactus_device_metadata(plain.device);
 	assert_int_equal(tactus_metadata_count(a), tactus_metadata_count(b));
 	for (size_t i = 0; i < tactus_metadata_count(a); i++)
-		assert_string_equal(tactus_metadata_value(a, i), tactus_metadata_value(b, i));
+		if (strcmp(tactus_metadata_key(a, i), "uri") != 0) /* two files */
+			assert_string_equal(tactus_metadata_value(a, i), tactus_metadata_value(b, i));
 	rig_free(&scan);
 	rig_free(&plain);
 }
