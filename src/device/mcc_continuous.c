@@ -7,7 +7,6 @@
 #include "device/mcc_continuous.h"
 
 enum { FAILURES_MAX = 3 }; /* restarts that bring nothing, before the device counts as lost */
-#define DRIFT_MAX 1e-3     /* of two quartz clocks; more is a sign of something else */
 #define PERIODS_MIN 2      /* of the drive in a reading */
 
 int tactus_mcc_continuous_make(tactus_mcc_continuous *c, tactus_mcc_usb *usb, const tactus_mcc_scale *scale,
@@ -56,10 +55,6 @@ static int begin(tactus_mcc_continuous *c, int64_t *first_ns)
 	const double bytes_per_s = 2 * (double)c->wave.width * c->wave.scan.rate_Hz;
 	int code = tactus_mcc_wave_restart(&c->wave);
 	c->ticks = c->kept = 0;
-	c->least_s = INFINITY;
-	c->first_s = NAN;
-	c->drift_s = 0;
-	c->second_end = (uint64_t)ceil(c->wave.scan.rate_Hz);
 	code = code < 0 ? code : tactus_mcc_stream_start(&c->stream, c->usb, tactus_mcc_transfer_bytes(bytes_per_s));
 	if (code < 0)
 		return code;
@@ -77,7 +72,7 @@ int tactus_mcc_continuous_start(tactus_mcc_continuous *c, tactus_device *device,
 	int64_t first_ns = 0;
 	const int code = begin(c, &first_ns);
 	tactus_live_begin(&device->live, 1 / c->period_s, settings);
-	c->start_s = tactus_live_at_s(&device->live, first_ns);
+	tactus_mcc_clock_start(&c->clock, c->wave.scan.rate_Hz, tactus_live_at_s(&device->live, first_ns));
 	c->base = c->failures = 0;
 	c->held = c->given = 0;
 	device->expected_scans = tactus_live_expected(1 / c->period_s, settings);
@@ -91,30 +86,13 @@ int tactus_mcc_continuous_resume(tactus_mcc_continuous *c, tactus_device *device
 	const int code = begin(c, &first_ns);
 	if (code < 0)
 		return code;
-	c->start_s = tactus_live_at_s(&device->live, first_ns);
-	const double number = ceil(c->start_s / c->period_s);
+	tactus_mcc_clock_start(&c->clock, c->wave.scan.rate_Hz, tactus_live_at_s(&device->live, first_ns));
+	const double number = ceil(c->clock.start_s / c->period_s);
 	c->base = number > (double)device->live.next ? (uint64_t)number : device->live.next;
 	return TACTUS_OK;
 }
 
 /* ---- reading ---- */
-
-/*
- * The device's clock against ours: no transfer can come before its last tick, so the least delay of every second tells
- * how far the two have drifted apart since the first.
- */
-static void track(tactus_mcc_continuous *c, double now_s)
-{
-	const double taken_s = (double)c->ticks / c->wave.scan.rate_Hz;
-	c->least_s = fmin(c->least_s, now_s - c->start_s - taken_s);
-	if (c->ticks < c->second_end)
-		return;
-	c->first_s = isnan(c->first_s) ? c->least_s : c->first_s;
-	if (fabs(c->least_s - c->first_s) <= DRIFT_MAX * taken_s)
-		c->drift_s = c->least_s - c->first_s;
-	c->least_s = INFINITY;
-	c->second_end = c->ticks + (uint64_t)ceil(c->wave.scan.rate_Hz);
-}
 
 /* The readings that the last ticks completed: scan by scan, every lane's. */
 static void collect(tactus_mcc_continuous *c, tactus_device *device, size_t count)
@@ -127,7 +105,7 @@ static void collect(tactus_mcc_continuous *c, tactus_device *device, size_t coun
 			tactus_reading reading =
 				tactus_daq_reading(c->wave.daq, sensor != NULL ? sensor : c->wave.daq->plan.scanned[0], c->wave.mode);
 			tactus_mcc_wave_get(&c->wave, k, i, &reading, &number);
-			reading.time_s += c->start_s + c->drift_s;
+			reading.time_s = tactus_mcc_clock_at_s(&c->clock, reading.time_s);
 			reading.sequence = c->base + number;
 			if (reading.sequence >= c->limit)
 				return;
@@ -150,7 +128,7 @@ static int take(tactus_mcc_continuous *c, tactus_device *device, const uint8_t *
 	memmove(c->bytes, c->bytes + ticks * step, c->kept);
 	c->ticks += ticks;
 	c->failures = 0;
-	track(c, tactus_live_now_s(&device->live));
+	tactus_mcc_clock_track(&c->clock, c->ticks, tactus_live_now_s(&device->live));
 	collect(c, device, (size_t)count);
 	return TACTUS_OK;
 }

@@ -2,6 +2,7 @@
 #ifndef TACTUS_MCC_CONTINUOUS_H
 #define TACTUS_MCC_CONTINUOUS_H
 
+#include "device/mcc_clock.h"
 #include "device/mcc_wave.h"
 
 typedef struct {
@@ -12,14 +13,11 @@ typedef struct {
 	uint64_t limit; /* scans, UINT64_MAX: no end */
 	double period_s;
 	/* since the last (re)start */
+	tactus_mcc_clock clock;
 	uint64_t base, ticks; /* number of the first reading; ticks that came */
 	uint8_t bytes[TACTUS_MCC_TRANSFER_MAX + 2 * TACTUS_MCC_INPUTS];
-	size_t kept;             /* bytes of a tick whose rest is in the next transfer */
-	unsigned failures;       /* restarts without a byte between them */
-	double start_s;          /* on our clock, of the first tick */
-	double least_s, first_s; /* how late transfers come: the least of this second, and of the first one */
-	double drift_s;          /* of the device's clock against ours */
-	uint64_t second_end;     /* ticks */
+	size_t kept;       /* bytes of a tick whose rest is in the next transfer */
+	unsigned failures; /* restarts without a byte between them */
 	/* readings that wait */
 	tactus_reading *readings;
 	size_t capacity, held, given;
