@@ -193,16 +193,19 @@ static void test_a_device_that_falls_silent_is_asked_again_then_lost_then_found(
 	start(device, &settings);
 	assert_true(tactus_device_read(device, readings, 8) > 0);
 	usb->silent_bulk = true;
+	uint64_t last = 0;
 	long n;
-	do
-		n = tactus_device_read(device, readings, 8);
-	while (n > 0);
+	while ((n = tactus_device_read(device, readings, 8)) > 0)
+		last = readings[n - 1].sequence;
 	assert_int_equal(n, TACTUS_ERR_LOST);
 	assert_int_equal(tactus_device_faults(device).timeouts, 4);
 	usb->silent_bulk = false;
 	assert_int_equal(tactus_device_recover(device, 0), 0);
 	assert_true(tactus_device_read(device, readings, 8) > 0);
 	assert_ramp(&readings[0], 0, 200);
+	/* Four time-outs of 0.3 s are 120 readings, less those that the mock gave ahead of time: 16 transfers of two each.
+	 */
+	assert_true(readings[0].sequence > last + 60);
 	tactus_device_close(device);
 	mock_free(usb);
 }
@@ -253,6 +256,32 @@ static void test_a_stream_goes_on_after_unplug_and_replug(void **state)
 	mock_free(usb);
 }
 
+static tactus_device *open_parallel(const char *options)
+{
+	return open_bench("09db:00ea",
+					  BENCH "modes = [\"ac\"]\nfrequency_Hz = 1000\n[switches]\nlead_capacitance_F = 0\n"
+							"[wiring]\nwaveform_inputs = [3, 0, 6]\ndrive_input = 1\n",
+					  options);
+}
+
+static void test_ticks_that_two_transfers_share_are_put_together(void **state)
+{
+	(void)state;
+	mock_usb *usb = mock_new(0x00ea);
+	tactus_reading readings[64];
+	usb->input_V = wave_V;
+	mock_plug(usb, 1);
+	tactus_device *device = open_parallel("&stream=60kHz&timeout=10s");
+	tactus_scan_settings settings = counted(30, two, 2);
+	settings.rate_Hz = 100;
+	start(device, &settings);
+	assert_int_equal(read_all(device, readings, 64), 60); /* ticks of 6 bytes, transfers of 113 packets */
+	for (size_t i = 0; i < 60; i++)
+		assert_wave(&readings[i], i % 2 == 0 ? 3 : 0);
+	tactus_device_close(device);
+	mock_free(usb);
+}
+
 static void test_amplifiers_of_their_own_are_sampled_at_once(void **state)
 {
 	(void)state;
@@ -260,11 +289,7 @@ static void test_amplifiers_of_their_own_are_sampled_at_once(void **state)
 	tactus_reading readings[64];
 	usb->input_V = wave_V;
 	mock_plug(usb, 1);
-	tactus_device *device =
-		open_bench("09db:00ea",
-				   BENCH "modes = [\"ac\"]\nfrequency_Hz = 1000\n[switches]\nlead_capacitance_F = 0\n"
-						 "[wiring]\nwaveform_inputs = [3, 0, 6]\ndrive_input = 1\n",
-				   "&stream=100kHz&timeout=10s");
+	tactus_device *device = open_parallel("&stream=100kHz&timeout=10s");
 	static const int channels[] = {2, 3, 1}, inputs[] = {0, 6, 3};
 	tactus_scan_settings settings = counted(10, channels, 3);
 	settings.rate_Hz = 100;
@@ -389,6 +414,7 @@ int main(void)
 		cmocka_unit_test(test_a_full_buffer_is_counted_and_the_scan_goes_on_after_a_gap),
 		cmocka_unit_test(test_a_device_that_falls_silent_is_asked_again_then_lost_then_found),
 		cmocka_unit_test(test_a_stream_goes_on_after_unplug_and_replug),
+		cmocka_unit_test(test_ticks_that_two_transfers_share_are_put_together),
 		cmocka_unit_test(test_amplifiers_of_their_own_are_sampled_at_once),
 		cmocka_unit_test(test_inputs_that_are_converted_in_turn_keep_their_phase),
 		cmocka_unit_test(test_what_is_switched_is_read_in_bursts),
