@@ -89,17 +89,4 @@ test_a_signal_ends_a_scan_with_a_whole_file() {
 	[ "$(tail -c 1 run.csv | od -An -tx1 | tr -d ' ')" = 0a ]
 }
 
-# ---- permissions, with the udev that is in the machine ----
-
-test_a_permission_problem_prints_a_remedy_that_helps() {
-	exits 4 su user -c 'tactus scan hid:scale --count 1'
-	cat err
-	sed -n 's/.*load them: //p' err | sed 's/sudo //g' >remedy
-	grep '^cp /' remedy
-	mkdir -p /etc/udev/rules.d
-	sh -e remedy
-	udevadm settle --timeout=20
-	exits 0 su user -c 'tactus scan hid:scale --count 1'
-}
-
 run_tests "$0" "$@"
