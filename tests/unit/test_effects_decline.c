@@ -1,5 +1,6 @@
 /* cyclic-decline and linear-decline: what cycling takes from the swing, what it leaves, and on which clock. */
 #include "effects_rig.h"
+#include "model/series.h"
 
 enum { N = 60000 };
 
@@ -210,6 +211,39 @@ static void linear_decline_is_linear_in_time_and_capped(void **unused)
 	rig_near(loss(N - 100), 0.9, 1e-12);
 }
 
+/* Even the widest cycling takes no more than that, at the same rate. */
+static void the_largest_loss_scales_what_is_lost(void **unused)
+{
+	(void)unused;
+	double p[TACTUS_PARAMETERS_MAX];
+	cyclic_parameters(p);
+	rig_set(cyclic, p, "largest_loss", 0.3);
+	cycle(0.25, 0.02, N);
+	run(cyclic, p, N);
+	double end = 0.3 * 1.55 / (1.55 + 0.8);
+	for (size_t period = 1; period < N / 200; period++)
+		rig_near(loss(200 * period + 100), end * (1 - exp(-0.006 * (time_s[200 * period + 100] - 2.2))), 1e-3);
+}
+
+/* A pause is one by the cycles of the recording: half of one takes 10 s here. */
+static void pauses_are_proposed_from_the_cycles(void **unused)
+{
+	(void)unused;
+	double values[4];
+	cycle(0.05, 0.1, 6000);
+	tactus_series series = {.domain = &tactus_domain_sensor, .n = 6000, .dt = 0.1};
+	series.signal[SENSOR_TIME] = time_s;
+	series.signal[SENSOR_FORCE] = load;
+	for (size_t k = 0; k < 2; k++) {
+		const tactus_effect *effect = k ? linear : cyclic;
+		size_t pause = rig_index(effect, "pause_s"), relaxation = rig_index(effect, "valley_relaxation_s");
+		assert_int_equal(effect->propose(&series, pause, values, 4), 1);
+		rig_near(values[0], 40, 1);
+		assert_int_equal(effect->propose(&series, relaxation, values, 4), 2);
+		assert_true(values[0] < 10 && values[1] > 20);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -222,6 +256,8 @@ int main(void)
 		cmocka_unit_test(the_printed_equation_is_an_option),
 		cmocka_unit_test(an_initial_loss_acts_from_the_first_sample),
 		cmocka_unit_test(linear_decline_is_linear_in_time_and_capped),
+		cmocka_unit_test(the_largest_loss_scales_what_is_lost),
+		cmocka_unit_test(pauses_are_proposed_from_the_cycles),
 	};
 	return cmocka_run_group_tests_name("effects: decline under cycling", tests, NULL, NULL);
 }

@@ -5,6 +5,8 @@
 #ifndef TACTUS_CYCLES_H
 #define TACTUS_CYCLES_H
 
+#include <stdlib.h>
+
 #include "model/effects/effect_util.h"
 
 /* Parameters that both effects begin with, in this order. */
@@ -125,6 +127,55 @@ static inline void tactus_cycles_process(const double *p, double *state, size_t 
 	for (size_t i = 0; i < n; i++)
 		force[i] = isnan(force[i]) || isnan(time[i]) ? NAN : tactus_cycles_sample(p, state, force[i], time[i], decline);
 }
+
+static inline int tactus_cycles_ascending(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}
+
+/* Median time between turns of the load, half a cycle; NaN if it does not turn. */
+static inline double tactus_cycles_half_s(const tactus_series *series)
+{
+	const double *force = series->signal[SENSOR_FORCE], *time = series->signal[SENSOR_TIME];
+	double *spans = force && time ? malloc((series->n + 1) * sizeof *spans) : NULL;
+	double h = 0.05 * (tactus_series_maximum(series, SENSOR_FORCE) - tactus_series_minimum(series, SENSOR_FORCE));
+	double low = NAN, high = NAN, last = NAN;
+	int direction = 0;
+	size_t count = 0;
+	for (size_t i = 0; spans && i < series->n; i++) {
+		low = fmin(low, force[i]);
+		high = fmax(high, force[i]);
+		bool peak = direction >= 0 && force[i] < high - h, valley = direction <= 0 && force[i] > low + h;
+		if (!peak && !valley)
+			continue;
+		if (direction != 0 && time[i] > last)
+			spans[count++] = time[i] - last;
+		last = time[i];
+		direction = peak ? -1 : 1;
+		low = high = force[i];
+	}
+	if (count > 0)
+		qsort(spans, count, sizeof *spans, tactus_cycles_ascending);
+	double half_s = count > 0 ? spans[count / 2] : NAN;
+	free(spans);
+	return half_s;
+}
+
+/* Cycling has ended when a turn is two cycles late; a higher valley is accepted well within a cycle, or after some. */
+static inline size_t tactus_cycles_propose(const tactus_series *series, size_t parameter, double *values, size_t most)
+{
+	double half_s = tactus_cycles_half_s(series);
+	if (most < 2 || !(half_s > 0))
+		return 0;
+	values[0] = parameter == CYCLES_PAUSE ? 4 * half_s : 0.25 * half_s;
+	values[1] = 10 * half_s;
+	return parameter == CYCLES_PAUSE ? 1 : 2;
+}
+
+/* clang-format off */
+#define CYCLES_SEARCHES {CYCLES_PAUSE, TACTUS_SEARCH_PROPOSED, 0, {0}}, {CYCLES_RELAXATION, TACTUS_SEARCH_PROPOSED, 0, {0}}
+/* clang-format on */
 
 static inline const char *tactus_cycles_testable(const tactus_series *series)
 {

@@ -1,7 +1,7 @@
 /* cyclic-decline: the FlexiForce loses sensitivity, exponentially in the seconds that the load cycles. */
 #include "model/effects/cycles.h"
 
-enum { RATE = CYCLES_PARAMETERS, HALF_AMPLITUDE, PRINTED, PRINTED_COEFFICIENT };
+enum { RATE = CYCLES_PARAMETERS, HALF_AMPLITUDE, PRINTED, PRINTED_COEFFICIENT, MOST };
 
 static const tactus_parameter parameters[] = {
 	CYCLES_PARAMETER_ROWS,
@@ -11,6 +11,8 @@ static const tactus_parameter parameters[] = {
 	{"printed_equation", "1", "1: the loss in the end as printed in eq. (7); 0: A/(A + A0)", 0, 0, 1, 0, 1,
 	 TACTUS_CONSTANT, -1},
 	{"printed_coefficient_per_N2", "1/N2", "coefficient of eq. (7)", 1.377, 0, 1e9, 1.377, 1, TACTUS_CONSTANT, -1},
+	{"largest_loss", "1", "share of the sensitivity that the widest cycling takes in the end", 1, 1e-3, 1, 1, 0.2,
+	 TACTUS_SHAPE, -1},
 };
 
 /*
@@ -20,7 +22,7 @@ static const tactus_parameter parameters[] = {
 static double final_loss(const double *p, double amplitude)
 {
 	double k = p[PRINTED_COEFFICIENT] * amplitude * amplitude;
-	return p[PRINTED] != 0 ? (1 + k) / (2 + k) : amplitude / (amplitude + p[HALF_AMPLITUDE]);
+	return p[PRINTED] != 0 ? (1 + k) / (2 + k) : p[MOST] * amplitude / (amplitude + p[HALF_AMPLITUDE]);
 }
 
 /* ds/dt = b (s∞(A) − s). */
@@ -35,7 +37,8 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 	tactus_cycles_process(p, state, n, signal, decline);
 }
 
-static const tactus_search searches[] = {{HALF_AMPLITUDE, TACTUS_SEARCH_VALUES, 3, {0.05, 0.2, 1}}};
+static const tactus_search searches[] = {
+	CYCLES_SEARCHES, {HALF_AMPLITUDE, TACTUS_SEARCH_VALUES, 2, {0.1, 1}}, {MOST, TACTUS_SEARCH_VALUES, 2, {1, 0.2}}};
 
 const struct tactus_effect tactus_effect_sensor_cyclic_decline = {
 	.name = "cyclic-decline",
@@ -53,5 +56,6 @@ const struct tactus_effect tactus_effect_sensor_cyclic_decline = {
 	.reset = tactus_cycles_reset,
 	.process = process,
 	TACTUS_SEARCHES(searches),
+	.propose = tactus_cycles_propose,
 	.testable = tactus_cycles_testable,
 };

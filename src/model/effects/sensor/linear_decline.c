@@ -24,6 +24,8 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 	tactus_cycles_process(p, state, n, signal, decline);
 }
 
+static const tactus_search searches[] = {CYCLES_SEARCHES};
+
 const struct tactus_effect tactus_effect_sensor_linear_decline = {
 	.name = "linear-decline",
 	.summary = "sensitivity is lost, linearly in time, while the load cycles; the minima stay",
@@ -38,5 +40,7 @@ const struct tactus_effect tactus_effect_sensor_linear_decline = {
 	.state_size = CYCLES_STATES,
 	.reset = tactus_cycles_reset,
 	.process = process,
+	TACTUS_SEARCHES(searches),
+	.propose = tactus_cycles_propose,
 	.testable = tactus_cycles_testable,
 };
