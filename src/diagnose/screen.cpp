@@ -408,7 +408,8 @@ double Screen::add_best(State &state, const Shelf::Term &term, Part &part) const
 		part.free.push_back(s);
 	}
 	for (size_t p = 0; p < part.value.size(); p++)
-		if (at->part.effect->parameters[p].kind == TACTUS_CONSTANT)
+		if (part.effect->parameters[p].kind == TACTUS_CONSTANT &&
+			term_of(part.effect, p) == term_of(part.effect, at->strengths.front()))
 			part.value[p] = at->part.value[p];
 	for (size_t k = 0; k < best.chosen.size(); k++) {
 		const size_t s = at->strengths[size_t(best.chosen[k])];
