@@ -169,6 +169,8 @@ class Decider
 	bool challenge(Cause &cause);
 	void add_alike(Cause &cause) const;
 	void settle();
+	double added(const double *variance) const;
+	void imprints();
 	void adequacy();
 	void staleness();
 	bool needless(const Group &group) const;
@@ -374,6 +376,46 @@ void Decider::settle()
 	};
 	std::sort(d.causes.begin(), d.causes.end(),
 			  [&](const Cause &a, const Cause &b) { return open(a) != open(b) ? open(a) : a.delta < b.delta; });
+}
+
+/* The largest share of what is left in an output that white noise of these variances is. */
+double Decider::added(const double *variance) const
+{
+	double share = 0;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		if (problem.training_of[o] == 0 || !(problem.scale[o] > 0))
+			continue;
+		double white = variance[o] / std::pow(problem.scale[o] * problem.noise.sigma[o], 2), filter = 1;
+		for (const double a : problem.noise.a[o])
+			filter += a * a;
+		share = std::fmax(share, white * filter * double(problem.training_of[o]) / d.final.square_of[o]);
+	}
+	return share;
+}
+
+/* Effects whose mark stands in the readings where no prediction shows it, if they add their share to what is left. */
+void Decider::imprints()
+{
+	for (size_t i = 0; problem.domain->effects[i]; i++) {
+		const tactus_effect *effect = problem.domain->effects[i];
+		if (!effect->imprint || d.final.hypothesis.has(effect) || !testable(effect))
+			continue;
+		Part part = problem.neutral(effect);
+		double variance[TACTUS_OUTPUTS_MAX] = {};
+		const double odds = effect->imprint(problem.segments.front(), part.value.data(), variance);
+		if (!(odds > limits.evidence) || !(added(variance) > limits.share))
+			continue;
+		for (size_t p = 0; p < effect->parameter_count; p++)
+			if (problem.acts(effect->parameters[p]) && part.value[p] != effect->parameters[p].neutral)
+				part.free.push_back(p);
+		Hypothesis h = d.final.hypothesis;
+		h.add(problem.domain, part);
+		const Fit with = problem.fit(h, Rows::train);
+		if (!with.ok)
+			continue;
+		d.causes.push_back({effect, d.final, std::fmin(with.cost - d.final.cost, 0) - odds, std::exp(-0.5 * odds), {}});
+		d.final = with;
+	}
 }
 
 std::vector<Dependence> Decider::map(const Fit &fit) const
@@ -585,6 +627,7 @@ Decision Decider::run()
 	d.wrong = map(d.base);
 	select();
 	settle();
+	imprints();
 	adequacy();
 	staleness();
 	d.verdict = verdict();

@@ -101,13 +101,40 @@ bool fixed(const tactus_effect *effect, size_t parameter)
 
 } // namespace
 
+/* Without the effects that have no gradient: what they let through has that of what came in. */
+static Hypothesis smooth(const Hypothesis &h)
+{
+	Hypothesis result = h;
+	for (const Part &part : h.parts)
+		for (size_t p = 0; p < part.value.size(); p++)
+			if (searched(part.effect, p, TACTUS_SEARCH_EXACT)) {
+				result.remove(part.effect);
+				break;
+			}
+	return result;
+}
+
 /* Forward differences; a larger step where a small one moves nothing (rounding, thresholds). */
 bool Problem::derivatives(const Hypothesis &h, const VectorXd &y0, const std::vector<Slot> &list, MatrixXd &d) const
 {
 	d.resize(rows(), Index(list.size()));
-	VectorXd y;
+	VectorXd y, y_smooth;
+	const Hypothesis without = smooth(h);
+	const bool stairs = without.parts.size() < h.parts.size();
+	if (stairs && !simulate(without, y_smooth))
+		return false;
 	for (size_t j = 0; j < list.size(); j++) {
 		const Slot &slot = list[j];
+		if (stairs && slot.part < 0) {
+			Hypothesis moved = without;
+			double &at = value(moved, slot);
+			const double from = at, step = 1e-5 * slot.scale;
+			at = from + step <= slot.info->upper ? from + step : from - step;
+			if (at == from || !simulate(moved, y))
+				return false;
+			d.col(Index(j)) = (y - y_smooth) / (at - from);
+			continue;
+		}
 		Hypothesis moved = h;
 		double &at = value(moved, slot);
 		const double from = at;

@@ -124,6 +124,12 @@ struct tactus_effect {
 	/* Values that a TACTUS_SEARCH_PROPOSED parameter may have in this series, at most `most`; NULL if there is none. */
 	size_t (*propose)(const struct tactus_series *series, size_t parameter, double *values, size_t most);
 	/*
+	 * What the effect leaves in the readings themselves and no prediction of them shows (codes on a lattice): twice the
+	 * logarithm of the odds that it is no chance, 0 if there is no such mark. Sets the parameters to what was read off,
+	 * variance[o] to what it adds to output o, in its unit squared. NULL: it leaves none.
+	 */
+	double (*imprint)(const struct tactus_series *series, double *parameters, double *variance);
+	/*
 	 * One more than the index of the base parameter that does the same; 0: none does. Where the recording states that
 	 * parameter it is held, so that the effect can be seen; where it does not, the effect is not testable.
 	 */

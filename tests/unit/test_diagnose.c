@@ -104,6 +104,40 @@ static void creep_is_named_and_its_gain_is_what_it_does(void **unused)
 	tactus_table_free(table);
 }
 
+/* With 0.4 steps of noise before it a converter's mean is as good as a line (Widrow 1956); its codes are a lattice. */
+static void a_coarse_converter_is_named_through_noise(void **unused)
+{
+	(void)unused;
+	enum { ROWS = 800 };
+	const char *names[] = {"time_s", "reference_resistance_ohm", "frequency_Hz", "drive_V", "amplitude_V"};
+	for (int coarse = 0; coarse <= 1; coarse++) {
+		tactus_table *table = tactus_table_new();
+		assert_int_equal(tactus_table_resize(table, ROWS), 0);
+		for (size_t k = 0; k < 5; k++)
+			tactus_table_set_numbers(table, names[k]);
+		double *column[5];
+		for (size_t k = 0; k < 5; k++)
+			column[k] = tactus_table_set_numbers(table, names[k]);
+		uint64_t seed = 11;
+		const double step = 0.02;
+		for (size_t i = 0; i < ROWS; i++) {
+			column[0][i] = 0.01 * (double)i;
+			column[1][i] = 1000 * pow(1.37, (double)(i * 7 % 11));
+			column[2][i] = 0;
+			column[3][i] = 0.5 * (double)(1 + i * 5 % 9);
+			double volts = -column[3][i] * 1000 / column[1][i] + 0.4 * step * noise(&seed);
+			column[4][i] = coarse ? step * round(volts / step) : volts;
+		}
+		const tactus_diagnosis *d = diagnosed(table, NULL);
+		assert_int_equal(d->verdict, coarse ? TACTUS_VERDICT_CAUSE_FOUND : TACTUS_VERDICT_NOTHING_WRONG);
+		assert_int_equal(d->series[0].cause_count, coarse);
+		if (coarse)
+			assert_string_equal(d->series[0].causes[0].effect, "adc-quantisation");
+		tactus_diagnosis_free(d);
+		tactus_table_free(table);
+	}
+}
+
 static void moved_sensitivity_is_a_stale_calibration(void **unused)
 {
 	(void)unused;
@@ -163,6 +197,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(nothing_hidden_is_nothing_wrong),
 		cmocka_unit_test(creep_is_named_and_its_gain_is_what_it_does),
+		cmocka_unit_test(a_coarse_converter_is_named_through_noise),
 		cmocka_unit_test(moved_sensitivity_is_a_stale_calibration),
 		cmocka_unit_test(scale_does_not_matter),
 		cmocka_unit_test(misuse_is_refused),

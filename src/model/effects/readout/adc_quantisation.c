@@ -76,9 +76,9 @@ static double concentration(const double *values, size_t n, double step, double 
 
 /*
  * The largest step that all values lie on a lattice of, a real converter's codes not being quite evenly spaced; 0 if
- * there is none, or so many codes that it is no coarse one.
+ * there is none, or so many codes that it is no coarse one. `count`: how many codes there are.
  */
-static double lattice(double *values, size_t n, double *offset)
+static double lattice(double *values, size_t n, double *offset, size_t *count)
 {
 	double largest = 0, least_gap = INFINITY;
 	size_t codes = 0;
@@ -91,6 +91,7 @@ static double lattice(double *values, size_t n, double *offset)
 				least_gap = fmin(least_gap, values[i] - values[codes - 1]);
 			values[codes++] = values[i];
 		}
+	*count = codes;
 	if (codes < 8 || codes > n / 3)
 		return 0;
 	/* As fine as the farthest code can tell steps apart. */
@@ -125,7 +126,7 @@ static double lattice(double *values, size_t n, double *offset)
 			sxy += whole * values[i];
 		}
 		double slope = (n1 * sxy - sx * sy) / (n1 * sxx - sx * sx);
-		if (fabs(slope - found) < finest * found) {
+		if (fabs(slope - found) < 3 * finest * found) {
 			*offset = (sy - slope * sx) / n1 / slope;
 			found = slope;
 		}
@@ -134,22 +135,53 @@ static double lattice(double *values, size_t n, double *offset)
 	return found;
 }
 
-static size_t propose(const tactus_series *series, size_t parameter, double *values, size_t most)
+/* The lattice of the amplitude's codes (or the phase's), and how many of its readings another one repeats. */
+static double lattice_of(const tactus_series *series, int which, double *offset, size_t *repeated)
 {
-	const double *reading = series->signal[parameter % 2 == PHASE_STEP ? READOUT_PHASE : READOUT_AMPLITUDE];
-	double *sorted = reading && most > 0 ? malloc((series->n + 1) * sizeof *sorted) : NULL;
-	double offset = 0, step = 0;
-	size_t n = 0;
+	const double *reading = series->signal[which == PHASE_STEP ? READOUT_PHASE : READOUT_AMPLITUDE];
+	double *sorted = reading ? malloc((series->n + 1) * sizeof *sorted) : NULL, step = 0;
+	size_t n = 0, codes = 0;
 	for (size_t i = 0; sorted && i < series->n; i++)
 		if (!isnan(reading[i]))
 			sorted[n++] = reading[i];
 	if (sorted && n > 8)
-		step = lattice(sorted, n, &offset);
+		step = lattice(sorted, n, offset, &codes);
+	*repeated = n - codes;
 	free(sorted);
+	if (fabs(*offset) < 0.02)
+		*offset = 0;
+	return step;
+}
+
+static size_t propose(const tactus_series *series, size_t parameter, double *values, size_t most)
+{
+	double offset = 0;
+	size_t repeated;
+	double step = most > 0 ? lattice_of(series, (int)(parameter % 2), &offset, &repeated) : 0;
 	if (!(step > 0))
 		return 0;
-	values[0] = parameter < AMPLITUDE_NOISE ? step : fabs(offset) < 0.02 ? 0 : offset;
+	values[0] = parameter < AMPLITUDE_NOISE ? step : offset;
 	return 1;
+}
+
+/*
+ * Rounding adds step²/12 however much noise there is before it, and with enough of it nothing that a prediction could
+ * foretell (Widrow 1956); but readings of a continuous size never repeat, and these lie on a lattice.
+ */
+static double imprint(const tactus_series *series, double *p, double *variance)
+{
+	double odds = 0;
+	for (int which = AMPLITUDE_STEP; which <= PHASE_STEP; which++) {
+		double offset = 0;
+		size_t repeated = 0;
+		double step = lattice_of(series, which, &offset, &repeated);
+		p[which] = step;
+		p[AMPLITUDE_OFFSET + which] = offset;
+		p[AMPLITUDE_NOISE + which] = step > 0 ? 0.4 : 0;
+		variance[which] = step * step / 12;
+		odds += step > 0 ? 2 * (double)repeated : 0;
+	}
+	return odds;
 }
 
 static int term(size_t parameter)
@@ -177,5 +209,6 @@ const struct tactus_effect tactus_effect_readout_adc_quantisation = {
 	TACTUS_SEARCHES(searches),
 	.term = term,
 	.propose = propose,
+	.imprint = imprint,
 	.testable = testable,
 };
