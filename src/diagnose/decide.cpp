@@ -232,7 +232,10 @@ bool Decider::stands(const Fit &with, const Fit &without) const
 	double share = 0;
 	for (size_t o = 0; o < problem.output_count; o++) {
 		const double before = without.square_of[o], gain = (before - with.square_of[o]) * earned(with, without);
-		if (gain > limits.further_share * (d.base.square_of[o] - before + gain))
+		const bool much = gain > limits.further_share * (d.base.square_of[o] - before + gain);
+		const bool rest = gain > limits.completing * (before - double(problem.training_of[o])) &&
+						  gain > limits.completing_share * before;
+		if (much || rest)
 			share = std::fmax(share, gain / before);
 	}
 	return with.ok && without.cost - with.cost > limits.evidence && share > limits.share &&
@@ -497,7 +500,12 @@ void Decider::adequacy()
 	d.steps = size_t(std::count_if(d.final.slots.begin(), d.final.slots.end(), [&](const Slot &slot) {
 		return slot.part >= 0 && instant(d.final.hypothesis.parts[size_t(slot.part)].effect, slot.index);
 	}));
-	d.structure = !d.left.empty() || d.bursts > 0 || d.steps >= limits.steps;
+	/* What a rival explains that the cause does not is left, whatever speaks for the cause. */
+	const bool outdone = std::any_of(d.causes.begin(), d.causes.end(), [](const Cause &c) {
+		return std::any_of(c.rivals.begin(), c.rivals.end(),
+						   [&](const Rival &r) { return r.delta < (1 + limits.outdone) * c.delta - limits.evidence; });
+	});
+	d.structure = !d.left.empty() || d.bursts > 0 || d.steps >= limits.steps || outdone;
 	if (d.causes.empty())
 		return;
 	for (const Dependence &dep : d.wrong)

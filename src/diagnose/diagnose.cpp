@@ -9,6 +9,7 @@
 #include "core/core.h"
 #include "device/uri.h"
 #include "diagnose/gather.hpp"
+#include "diagnose/limits.hpp"
 #include "diagnose/noise.hpp"
 #include "fit/fit_work.h"
 
@@ -153,6 +154,19 @@ void Diagnosis::explain(Work &work)
 	noise(work, y, plain.hypothesis, true);
 	work.evidence.base = plain.hypothesis;
 	work.decision = decide(work.evidence);
+	/* What a large cause left unlike its form had passed for noise: with the cause there it may be much less. */
+	if (work.decision.base.ok && !work.decision.causes.empty()) {
+		const Noise before = problem.noise;
+		problem.simulate(work.decision.final.hypothesis, y);
+		noise(work, y, work.decision.final.hypothesis, true);
+		bool less = false;
+		for (size_t o = 0; o < problem.output_count; o++)
+			less = less || problem.noise.sigma[o] < limits.less_noise * before.sigma[o];
+		if (less)
+			work.decision = decide(work.evidence);
+		else
+			problem.noise = before;
+	}
 	const Decision &d = work.decision;
 	if (!d.base.ok)
 		return;

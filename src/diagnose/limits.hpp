@@ -13,6 +13,10 @@ struct Limits {
 	double jump = 60, jump_share = 0.1; /* for instants, where held-out blocks cannot say */
 	double share = 0.05;                /* of the whitened squares that a cause must remove */
 	double further_share = 0.10;        /* and a further one, of all that was removed */
+	double completing = 0.7;            /* or of what is left above the noise, where that is little … */
+	double completing_share = 0.15;     /* … but this share of the squares */
+	double outdone = 0.25;              /* of a cause's evidence, by which a rival shows that more is there */
+	double less_noise = 0.9;            /* of the noise at first, below which all is decided again */
 	double relative_margin = 0.08;      /* and as a share of what the cause explains: no form is exact */
 	double margin = 10;                 /* over the runner-up, in Schwarz's criterion */
 	double parameter_share = 0.03;      /* of what an effect explains that each of its parameters must bring */

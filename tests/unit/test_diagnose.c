@@ -36,7 +36,7 @@ static double load_N(double t)
 }
 
 /* A spring in series with a Kelvin element: its strain by Euler's rule in small steps; share of the load, τ = 8 s. */
-static tactus_table *recording(double creep, double gain, uint64_t seed)
+static tactus_table *recording_with_jump(double creep, double gain, double jump_S, uint64_t seed)
 {
 	tactus_table *table = tactus_table_new();
 	assert_int_equal(tactus_table_resize(table, N), 0);
@@ -51,9 +51,14 @@ static tactus_table *recording(double creep, double gain, uint64_t seed)
 		force[i] = load_N(time[i]);
 		for (int k = 0; k < 50; k++)
 			strain += 0.002 / 8 * (force[i] - strain);
-		g[i] = 2e-6 + gain * 4e-7 * (force[i] + creep * strain) + 5e-8 * noise(&seed);
+		g[i] = 2e-6 + gain * 4e-7 * (force[i] + creep * strain) + 5e-8 * noise(&seed) + (i < 920 ? 0 : jump_S);
 	}
 	return table;
+}
+
+static tactus_table *recording(double creep, double gain, uint64_t seed)
+{
+	return recording_with_jump(creep, gain, 0, seed);
 }
 
 static const tactus_diagnosis *diagnosed(tactus_table *table, const tactus_diagnose_options *options)
@@ -100,6 +105,20 @@ static void creep_is_named_and_its_gain_is_what_it_does(void **unused)
 	assert_int_equal(tactus_simulator_new(d->extended, table, 0, &simulator), 0);
 	assert_int_equal(tactus_simulator_block(simulator, table), 0);
 	tactus_simulator_free(simulator);
+	tactus_diagnosis_free(d);
+	tactus_table_free(table);
+}
+
+/* A step that is small beside the cause before it, but all that is left of the misfit. */
+static void a_step_beside_a_large_cause_is_named(void **unused)
+{
+	(void)unused;
+	tactus_table *table = recording_with_jump(0.25, 1, 1.5e-7, 9); /* three times the noise */
+	const tactus_diagnosis *d = diagnosed(table, NULL);
+	assert_int_equal(d->verdict, TACTUS_VERDICT_CAUSE_FOUND);
+	assert_int_equal(d->series[0].cause_count, 2);
+	assert_string_equal(d->series[0].causes[0].effect, "creep");
+	assert_string_equal(d->series[0].causes[1].effect, "step-change");
 	tactus_diagnosis_free(d);
 	tactus_table_free(table);
 }
@@ -197,6 +216,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(nothing_hidden_is_nothing_wrong),
 		cmocka_unit_test(creep_is_named_and_its_gain_is_what_it_does),
+		cmocka_unit_test(a_step_beside_a_large_cause_is_named),
 		cmocka_unit_test(a_coarse_converter_is_named_through_noise),
 		cmocka_unit_test(moved_sensitivity_is_a_stale_calibration),
 		cmocka_unit_test(scale_does_not_matter),
