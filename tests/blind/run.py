@@ -170,12 +170,13 @@ def tap(checks, figures):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--suite", choices=("quick", "full"), default="quick")
-    parser.add_argument("--seed-base", type=int, help="first seed: 1000 and up while tuning, 95000 and up to report")
+    parser.add_argument("--seed-base", type=int, help="first seed: 1000 and up while tuning, 97000 and up to report")
     parser.add_argument("--only", help="only kinds that begin so, such as one/creep or two")
     parser.add_argument("--count", type=int, help="recordings of each kind, in place of the suite's numbers")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--tap", action="store_true", help="print what scripts/run-tests reads")
     parser.add_argument("--again", action="store_true", help="diagnose again what was generated before")
+    parser.add_argument("--resume", action="store_true", help="go on where the same build was interrupted")
     parser.add_argument("--generate-only", action="store_true")
     parser.add_argument("--output", type=pathlib.Path, default=ROOT / "BLIND.md", help="the report of a full run")
     options = parser.parse_args()
@@ -186,7 +187,7 @@ def main():
         cases = [(k, base + i) for k in dict.fromkeys(k for k, _ in cases) for i in range(options.count)]
     if options.only:
         cases = [(k, s) for k, s in cases if k.startswith(options.only)]
-    if options.suite == "quick" or reported:
+    if (options.suite == "quick" or reported) and not options.resume:
         shutil.rmtree(folder, ignore_errors=True)
     elif options.again:
         for kind, seed in cases:
