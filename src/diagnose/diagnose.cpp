@@ -77,7 +77,7 @@ void Diagnosis::noise(Work &work, const VectorXd &y, const Hypothesis &h, bool c
 		return;
 	const std::vector<size_t> outliers = find_outliers(problem, left);
 	if (!outliers.empty()) {
-		work.outliers = outliers;
+		work.outliers.insert(work.outliers.end(), outliers.begin(), outliers.end());
 		problem.noise = estimate_noise(problem, y, columns, left);
 		problem.count_training();
 	}
