@@ -85,13 +85,13 @@ FULL = {
     "null/sensor": 270,
     "null/readout": 130,
     "one": 20,
-    "two/sensor": 140,
+    "two/sensor": 120,
     "two/readout": 40,
     "unknown": 8,
     "stale": 8,
     "same": 11,
-    "fresh": 3,
-     "ambiguous": 4}
+    "fresh": 2,
+     "ambiguous": 3}
 QUICK = {"null/sensor": 6, "null/readout": 4, "two/sensor": 3, "two/readout": 2, "stale": 1}
 QUICK_KINDS = [
     "unknown/humidity",
