@@ -250,6 +250,7 @@ static int registers_reopen(tactus_device *device)
 	tactus_registers *r = device->state;
 	int code = tactus_modbus_reopen(r->link);
 	code = code < 0 ? code : identify(r, true);
+	code = code < 0 ? code : tactus_poll_read(&r->poll, 0, r->link); /* a port that opens is no device yet */
 	code = code < 0 ? code : write_start(r);
 	r->failed = 0;
 	r->counted = false;

@@ -419,6 +419,28 @@ static void test_a_device_that_falls_silent_is_lost_and_found_again(void **state
 	}
 }
 
+/* Nothing but its readings says that it is there. */
+static void test_a_silent_device_is_not_found_by_its_port_alone(void **state)
+{
+	(void)state;
+	for (int serial = 0; serial < 2; serial++) {
+		modbus_bench b = {.serial = serial != 0};
+		char *path = rig_file(".toml", ONE);
+		tactus_reading reading;
+		bench_start(&b);
+		tactus_device *device = start_cell(&b, path, "&timeout=50ms&retries=0");
+		b.deaf = true;
+		assert_int_equal(tactus_device_read(device, &reading, 1), TACTUS_ERR_LOST);
+		assert_int_equal(tactus_device_recover(device, 0), TACTUS_ERR_LOST);
+		b.deaf = false;
+		assert_int_equal(tactus_device_recover(device, 10), 0);
+		assert_int_equal(tactus_device_read(device, &reading, 1), 1);
+		tactus_device_close(device);
+		rig_remove(path);
+		bench_stop(&b);
+	}
+}
+
 static void test_a_board_that_starts_anew_is_told_everything_again(void **state)
 {
 	(void)state;
@@ -511,6 +533,7 @@ int main(void)
 		cmocka_unit_test(test_other_quantities_become_further_columns),
 		cmocka_unit_test(test_a_start_that_fails_half_way_leaves_the_device_safe),
 		cmocka_unit_test(test_a_device_that_falls_silent_is_lost_and_found_again),
+		cmocka_unit_test(test_a_silent_device_is_not_found_by_its_port_alone),
 		cmocka_unit_test(test_a_board_that_starts_anew_is_told_everything_again),
 		cmocka_unit_test(test_an_hour_of_traffic_leaves_memory_and_descriptors_as_they_were),
 	};
