@@ -235,6 +235,27 @@ static ssize_t send_serial(tactus_modbus *link, const tactus_modbus_request *r)
 	return modbus_send_raw_request(link->context, frame, (int)(1 + r->length));
 }
 
+/* Throws away what nobody asked for: bytes, or TACTUS_ERR_LOST. */
+static long drain(tactus_modbus *link)
+{
+	uint8_t bytes[512];
+	long sum = 0;
+	const int descriptor = modbus_get_socket(link->context);
+	while (sum < DRAIN_MAX) {
+		const ssize_t n = link->options.serial ? read(descriptor, bytes, sizeof(bytes))
+											   : recv(descriptor, bytes, sizeof(bytes), MSG_DONTWAIT);
+		if (n < 0 && errno != EAGAIN && errno != EINTR)
+			return lose(link, strerror(errno));
+		if (n == 0 && !link->options.serial)
+			return lose(link, "the other side hung up");
+		if (n <= 0)
+			break;
+		sum += n;
+	}
+	return sum;
+}
+
+/* What came until the very moment of sending cannot be the answer. */
 static int send_request(tactus_modbus *link, const tactus_modbus_request *r)
 {
 	if (link->options.serial && tactus_clock_ns() < link->quiet_ns) {
@@ -242,6 +263,10 @@ static int send_request(tactus_modbus *link, const tactus_modbus_request *r)
 		if (code < 0)
 			return code;
 	}
+	const long stale = drain(link);
+	if (stale < 0)
+		return (int)stale;
+	link->faults->mismatched += stale > 0 ? 1 : 0;
 	const ssize_t sent = link->options.serial ? send_serial(link, r) : send_tcp(link, r);
 	if (sent >= 0)
 		return TACTUS_OK;
@@ -345,44 +370,22 @@ static int receive(tactus_modbus *link, const tactus_modbus_request *r)
 
 /* ---- cleaning ---- */
 
-/* Throws away what nobody asked for: bytes, or TACTUS_ERR_LOST. */
-static long drain(tactus_modbus *link)
-{
-	uint8_t bytes[512];
-	long sum = 0;
-	const int descriptor = modbus_get_socket(link->context);
-	while (sum < DRAIN_MAX) {
-		const ssize_t n = link->options.serial ? read(descriptor, bytes, sizeof(bytes))
-											   : recv(descriptor, bytes, sizeof(bytes), MSG_DONTWAIT);
-		if (n < 0 && errno != EAGAIN && errno != EINTR)
-			return lose(link, strerror(errno));
-		if (n == 0 && !link->options.serial)
-			return lose(link, "the other side hung up");
-		if (n <= 0)
-			break;
-		sum += n;
-	}
-	return sum;
-}
-
-/* Waits until nothing has come for a while. */
+/* Waits until nothing has come for a while, but not for ever. */
 static int wait_silence(tactus_modbus *link)
 {
 	const double quiet_s = fmax(link->silence_s, fmin(ADAPTER_S, link->timeout_s));
-	long sum = 0;
-	for (;;) {
+	const int64_t end_ns = tactus_clock_ns() + (int64_t)(1e9 * fmax(link->timeout_s, 10 * quiet_s));
+	while (tactus_clock_ns() < end_ns) {
 		const int ready = await(link, tactus_clock_ns() + (int64_t)(1e9 * quiet_s));
 		const long n = ready > 0 ? drain(link) : 0;
-		if (ready < 0)
-			return lose(link, "hung up");
 		if (n < 0)
 			return (int)n;
+		if (ready < 0 || (ready > 0 && n == 0)) /* something to read that is nothing is the end */
+			return lose(link, "hung up");
 		if (ready == 0)
 			return TACTUS_OK;
-		sum += n;
-		if (sum > DRAIN_MAX || n == 0)
-			return fail_corrupted(link, "something on the line does not stop sending");
 	}
+	return fail_corrupted(link, "something on the line does not stop sending");
 }
 
 /*
@@ -410,11 +413,8 @@ static int probe(tactus_modbus *link, const tactus_modbus_request *next)
 static int clean(tactus_modbus *link, const tactus_modbus_request *next)
 {
 	int code = TACTUS_OK;
-	if (!link->doubtful) {
-		const long n = drain(link);
-		link->faults->mismatched += n > 0 ? 1 : 0;
-		return n < 0 ? (int)n : TACTUS_OK;
-	}
+	if (!link->doubtful)
+		return code;
 	if (!link->options.serial) {
 		code = connect_link(link);
 		if (code < 0 && code != TACTUS_ERR_INTERRUPTED)

@@ -78,6 +78,7 @@ static inline void bench_listen(modbus_bench *b)
 {
 	struct sockaddr_in address;
 	socklen_t size = sizeof(address);
+	memset(&address, 0, sizeof(address));
 	b->context = modbus_new_tcp("127.0.0.1", 0);
 	b->listener = modbus_tcp_listen(b->context, 4);
 	assert_true(b->listener >= 0);

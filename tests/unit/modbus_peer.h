@@ -157,10 +157,9 @@ static inline bool peer_reply(peer *p, enum peer_act act, const uint8_t *request
 	}
 	if (act == PREVIOUS || act == PREVIOUS_TOO)
 		peer_send(p, p->previous, p->previous_length);
+	memcpy(frame + n, frame, n);
 	if (act != SILENCE && act != PREVIOUS && act != LATE)
-		peer_send(p, frame, act == HALF || act == CLOSE ? n / 2 : n);
-	if (act == TWICE)
-		peer_send(p, frame, n);
+		peer_send(p, frame, act == HALF || act == CLOSE ? n / 2 : act == TWICE ? 2 * n : n);
 	memcpy(p->previous, frame, n);
 	p->previous_length = n;
 	return act != CLOSE;

@@ -269,29 +269,34 @@ static void test_the_board_is_told_and_read_over_a_serial_line(void **state)
 	try_board(true);
 }
 
+enum { BAD_SETTINGS = 7 };
+
+static tactus_scan_settings bad_settings(int i)
+{
+	static const int channels[] = {1, 1, 9};
+	tactus_scan_settings s = board_settings(1);
+	s.channels = i == 0 ? channels + 2 : channels;
+	s.channel_count = i == 0 ? 1 : i == 1 ? 2 : 0;
+	s.rate_Hz = i == 2 ? 1001 : s.rate_Hz;
+	s.drive_V = i == 3 ? 6 : s.drive_V;
+	s.settle_s = i == 4 ? 0.1 : s.settle_s; /* does not fit into its register */
+	s.frequency_Hz = i == 5 ? 2e5 : s.frequency_Hz;
+	s.settle_s = i == 6 ? 1e-3 : s.settle_s; /* 16 ms a scan do not fit into 1 ms */
+	return s;
+}
+
 static void test_settings_are_refused_before_anything_is_written(void **state)
 {
 	(void)state;
 	modbus_bench b = {.touch = board_touch};
-	const int nine[] = {9}, twice[] = {1, 1};
-	tactus_scan_settings bad[7];
-	for (size_t i = 0; i < COUNT(bad); i++)
-		bad[i] = board_settings(1);
-	bad[0].channels = nine;
-	bad[0].channel_count = 1;
-	bad[1].channels = twice;
-	bad[1].channel_count = 2;
-	bad[2].rate_Hz = 1001;
-	bad[3].drive_V = 6;
-	bad[4].settle_s = 0.1; /* does not fit into its register */
-	bad[5].frequency_Hz = 2e5;
-	bad[6].settle_s = 1e-3; /* 16 ms a scan do not fit into 1 ms */
 	bench_start(&b);
 	tactus_device *device = NULL;
 	assert_int_equal(tactus_device_open(bench_uri(&b, "tactus-board", ""), &device), 0);
-	for (size_t i = 0; i < COUNT(bad); i++)
-		if (tactus_device_start(device, &bad[i]) != TACTUS_ERR_ARGUMENT)
-			fail_msg("case %zu: %s", i, tactus_error_message());
+	for (int i = 0; i < BAD_SETTINGS; i++) {
+		const tactus_scan_settings bad = bad_settings(i);
+		if (tactus_device_start(device, &bad) != TACTUS_ERR_ARGUMENT)
+			fail_msg("case %d: %s", i, tactus_error_message());
+	}
 	assert_int_equal(b.writes, 0);
 	tactus_device_close(device);
 	bench_stop(&b);
