@@ -5,6 +5,20 @@
 hid() { virtual_hid tell "$@"; }
 usb() { virtual_usb tell "$@"; }
 
+# What a device says of itself has all these words.
+holds() { # STATE NAME=VALUE…
+	state=" $1 "
+	shift
+	for word; do
+		case $state in
+		*" $word "*) ;;
+		*) echo "not $word:$state" && return 1 ;;
+		esac
+	done
+}
+motor_is() { holds "$(hid motor state)" "$@"; }
+usb_is() { holds "$(usb state)" "$@"; }
+
 # Waits until a command succeeds, at most 15 s.
 await() {
 	n=0

@@ -5,12 +5,9 @@
 
 URI=usb:09db:00ea
 
-usb_is() { usb state | tr ' ' '\n' | grep -x "$1"; } # NAME=VALUE
-
 # Switches open, no scan runs, and nobody asked for the firmware to be erased.
 is_safe() {
-	usb state
-	usb_is latch=0 && usb_is running=0 && usb_is erase=0
+	usb_is latch=0 running=0 erase=0
 }
 
 # The resistances behind the switches, by channel.
@@ -151,7 +148,6 @@ test_a_closed_pipe_leaves_the_switches_open() {
 }
 
 test_settings_out_of_range_are_refused_before_anything_is_written() {
-	usb state >before
 	status=0
 	tactus scan $URI --mode dc --rate 1e6 --count 1 >out 2>err || status=$?
 	cat err

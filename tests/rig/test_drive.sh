@@ -4,15 +4,12 @@
 # shellcheck source=tests/rig/suite.sh disable=SC2317 # run_tests calls the functions
 . /rig/suite.sh
 
-motor_is() { hid motor state | tr ' ' '\n' | grep -x "$1"; } # NAME=VALUE
 value_of() { hid motor state | tr ' ' '\n' | sed -n "s/^$1=//p"; }
 
 # No torque is commanded, nor was when the program left; nothing plays, the actuators are off, the idle spring too. What
 # is left is the board's own damper, which brakes until the axis stands.
 is_off() {
-	hid motor state
-	motor_is commanded=0 && motor_is commanded_at_close=0 && motor_is active=0 && motor_is playing=0 &&
-		motor_is spring=0 && await motor_is torque=0
+	motor_is commanded=0 commanded_at_close=0 active=0 playing=0 spring=0 && await motor_is torque=0
 }
 
 test_positive_torque_turns_it_up_and_stop_ends_it() {
@@ -24,8 +21,7 @@ test_positive_torque_turns_it_up_and_stop_ends_it() {
 	[ "$(value_of peak)" -gt 900 ] # 0.25 of 32767, times 0.8 (effects) and 5000/32767 (power): 1000
 	[ "$(value_of peak)" -le 1000 ]
 	is_off
-	motor_is damper=30 # as it was
-	motor_is power=5000
+	motor_is damper=30 power=5000 # as they were
 }
 
 test_negative_torque_turns_it_down() {
@@ -88,8 +84,7 @@ test_sigkill_leaves_it_to_the_watchdog() {
 	kill -KILL $pid
 	wait $pid || true
 	await motor_is playing=0
-	motor_is commanded=0
-	motor_is spring=0
+	motor_is commanded=0 spring=0
 	exits 0 turn_motor stop 0.25 50 # and the next program finds it in order
 	is_off
 }
@@ -131,9 +126,7 @@ test_a_motor_that_falls_silent_is_switched_off() {
 	cat err
 	grep 'no position' err
 	[ $status -ne 0 ]
-	hid motor state
-	motor_is commanded=0
-	motor_is active=0
+	motor_is commanded=0 active=0
 }
 
 test_an_emergency_stop_refuses_the_start() {
