@@ -213,7 +213,7 @@ rig: ## the real programs in a virtual machine, with virtual devices on its USB 
 rig-programs: $(RIG)
 
 $(BUILD)/rig/virtual_usb: tests/rig/virtual_usb.c tests/rig/usbip.c tests/rig/rig.c
-$(BUILD)/rig/virtual_hid: tests/rig/virtual_hid.c tests/rig/virtual_scale.c tests/rig/virtual_motor.c tests/rig/rig.c
+$(BUILD)/rig/virtual_hid: $(addprefix tests/rig/,virtual_hid.c virtual_scale.c virtual_motor.c motor_reports.c rig.c)
 $(BUILD)/rig/test_usb $(BUILD)/rig/test_hid: $(BUILD)/rig/test_%: tests/rig/test_%.c tests/rig/rig.c
 $(BUILD)/rig/turn_motor: tests/rig/turn_motor.c $(HEADERS) $(SHARED)
 $(BUILD)/rig/turn_motor: RIG_LIBS = -L$(BUILD) -ltactus -Wl,-rpath,'$$ORIGIN'

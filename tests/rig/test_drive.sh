@@ -32,6 +32,32 @@ test_negative_torque_turns_it_down() {
 	is_off
 }
 
+# What the library says of the position is what the motor did, in both builds of the firmware.
+positions_agree() {
+	hid motor factory
+	exits 0 turn_motor stop 0.25 300
+	cat out
+	hid motor state
+	grep '^position_rad=' out | tr '= ' '  ' | awk -v turns="$(value_of position)" '{ n++; turned = $2 }
+		END { exit !(n == 1 && turned > 0.5 && turned < turns * 2 * 3.14159265 * 1.001) }'
+}
+
+test_positions_of_16_bits() {
+	positions_agree
+}
+
+test_positions_of_32_bits() {
+	hid motor wide 1
+	hid motor unplug
+	hid motor plug
+	await turn_motor stop 0 20
+	positions_agree
+	hid motor wide 0
+	hid motor unplug
+	hid motor plug
+	await turn_motor stop 0 20
+}
+
 test_the_limit_holds() {
 	hid motor factory
 	hid motor peak 0

@@ -260,8 +260,7 @@ static void an_overrun_stalls_until_cleared(void **state)
 	close_device(&h);
 }
 
-/* ---- a hundred thousand transfers
- * ---- */
+/* ---- a hundred thousand transfers ---- */
 
 enum { TRANSFERS = 100000, IN_FLIGHT = 64 };
 
@@ -319,8 +318,7 @@ static void a_hundred_thousand_transfers_in_order(void **state)
 	close_device(&h);
 }
 
-/* ---- unplug and replug
- * ---- */
+/* ---- unplug and replug ---- */
 
 static int LIBUSB_CALL came_or_went(libusb_context *usb, libusb_device *device, libusb_hotplug_event event,
 									void *context)

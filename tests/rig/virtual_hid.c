@@ -47,11 +47,13 @@ static void plug(virtual_hid *device)
 	snprintf((char *)create->name, sizeof(create->name), "%s", kind->name);
 	snprintf((char *)create->phys, sizeof(create->phys), "rig/%s", kind->word);
 	snprintf((char *)create->uniq, sizeof(create->uniq), "%s", kind->serial);
-	create->rd_size = (uint16_t)kind->descriptor_size;
+	size_t size;
+	const uint8_t *descriptor = kind->describe(&size);
+	create->rd_size = (uint16_t)size;
 	create->bus = BUS;
 	create->vendor = kind->vendor;
 	create->product = kind->product;
-	memcpy(create->rd_data, kind->descriptor, kind->descriptor_size);
+	memcpy(create->rd_data, descriptor, size);
 	device->fd = open("/dev/uhid", O_RDWR | O_CLOEXEC);
 	if (device->fd < 0)
 		rig_die("/dev/uhid");

@@ -12,8 +12,8 @@ typedef struct {
 	const char *word; /* what the commands for this device begin with */
 	const char *name, *serial;
 	uint16_t vendor, product;
-	const uint8_t *descriptor;
-	size_t descriptor_size;
+	/* Its report descriptor, as it is when it is plugged in. */
+	const uint8_t *(*describe)(size_t *size);
 	/* The first program opened its node, the last one closed it. */
 	void (*opened)(virtual_hid *device);
 	void (*closed)(virtual_hid *device);

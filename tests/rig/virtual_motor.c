@@ -8,274 +8,20 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "motor_reports.h"
 #include "rig.h"
 #include "virtual_hid.h"
 
-enum {
-	IN_POSITION = 0x01,
-	IN_STATE = 0x02,
-	OUT_EFFECT = 0x01,
-	OUT_CONSTANT = 0x05,
-	OUT_OPERATION = 0x0a,
-	OUT_FREE = 0x0b,
-	OUT_CONTROL = 0x0c,
-	OUT_GAIN = 0x0d,
-	FEATURE_CREATE = 0x11,
-	FEATURE_LOADED = 0x12,
-	FEATURE_POOL = 0x13,
-	COMMAND = 0xa1
-};
-enum { COMMAND_SIZE = 25, BLOCKS = 40, CONSTANT = 1, MAX = 0x7fff, INFINITE_ms = 0xffff };
+enum { COMMAND_SIZE = 25, BLOCKS = MOTOR_BLOCKS, CONSTANT = 1, MAX = 0x7fff, INFINITE_ms = 0xffff };
 
-/* ---- the report descriptor ---- */
+/* ---- state ---- */
 
-#define PAGE(n) 0x05, (n)
-#define USAGE(n) 0x09, (n)
-#define BEGIN(kind) 0xa1, (kind)
-#define END 0xc0
-#define REPORT(n) 0x85, (n)
-#define RANGE8(low, high) 0x15, (low), 0x25, (high)
-#define RANGE16(low, high) 0x16, ((low)&0xff), ((low) >> 8 & 0xff), 0x26, ((high)&0xff), ((high) >> 8 & 0xff)
-#define RANGE_U16(high) 0x15, 0x00, 0x27, ((high)&0xff), ((high) >> 8 & 0xff), 0x00, 0x00
-#define FIELD(bits, count) 0x75, (bits), 0x95, (count)
-#define INPUT 0x81, 0x02
-#define OUTPUT 0x91, 0x02
-#define OUTPUT_ARRAY 0x91, 0x00
-#define OUTPUT_CONSTANT 0x91, 0x03
-#define FEATURE 0xb1, 0x02
-#define FEATURE_ARRAY 0xb1, 0x00
-#define ORDINAL_1 0x0b, 0x01, 0x00, 0x0a, 0x00
-#define BLOCK_INDEX(item) USAGE(0x22), RANGE8(1, BLOCKS), FIELD(8, 1), item
-#define EFFECT_TYPES                                                                                                   \
-	USAGE(0x26), USAGE(0x27), USAGE(0x30), USAGE(0x31), USAGE(0x32), USAGE(0x33), USAGE(0x34), USAGE(0x40),            \
-		USAGE(0x41), USAGE(0x42), USAGE(0x43), RANGE8(1, 11), FIELD(8, 1)
-/* type, class, instance, command, value, address */
-#define COMMAND_FIELDS(item)                                                                                           \
-	REPORT(COMMAND), USAGE(0x01), RANGE16(0, 4), FIELD(8, 1), item, USAGE(0x02), FIELD(16, 1), item, USAGE(0x03),      \
-		FIELD(8, 1), item, USAGE(0x04), FIELD(32, 1), item, USAGE(0x05), FIELD(64, 1), item, USAGE(0x06),              \
-		FIELD(64, 1), item
+static bool wide; /* from the next plug on */
 
-/* Of the effects' reports those that a constant force needs; the firmware has more of the kind. */
-/* clang-format off: lines that say what belongs together */
-static const uint8_t descriptor[] = {PAGE(0x01),
-									 USAGE(0x04),
-									 BEGIN(1), /* a joystick: 64 buttons, eight axes, of which X is the motor's */
-									 BEGIN(0),
-									 REPORT(IN_POSITION),
-									 PAGE(0x09),
-									 0x19,
-									 1,
-									 0x29,
-									 64,
-									 RANGE8(0, 1),
-									 FIELD(1, 64),
-									 INPUT,
-									 PAGE(0x01),
-									 USAGE(0x30),
-									 USAGE(0x31),
-									 USAGE(0x32),
-									 USAGE(0x33),
-									 USAGE(0x34),
-									 USAGE(0x35),
-									 USAGE(0x37),
-									 USAGE(0x36),
-									 RANGE16(-MAX, MAX),
-									 FIELD(16, 8),
-									 INPUT,
-									 END,
-									 0x06,
-									 0x00,
-									 0xff,
-									 USAGE(0x00),
-									 BEGIN(1),
-									 COMMAND_FIELDS(OUTPUT),
-									 COMMAND_FIELDS(INPUT),
-									 END,
-									 PAGE(0x0f),
-									 USAGE(0x92),
-									 BEGIN(2),
-									 REPORT(IN_STATE), /* paused, enabled, safety switch, power, playing */
-									 USAGE(0x9f),
-									 USAGE(0xa0),
-									 USAGE(0xa4),
-									 USAGE(0xa6),
-									 USAGE(0x94),
-									 RANGE8(0, 1),
-									 FIELD(1, 5),
-									 INPUT,
-									 FIELD(1, 3),
-									 0x81,
-									 3,
-									 END,
-									 USAGE(0x21),
-									 BEGIN(2),
-									 REPORT(OUT_EFFECT),
-									 BLOCK_INDEX(OUTPUT),
-									 USAGE(0x25),
-									 BEGIN(2),
-									 EFFECT_TYPES,
-									 OUTPUT_ARRAY,
-									 END,
-									 USAGE(0x50),
-									 USAGE(0x54),
-									 USAGE(0x51),
-									 USAGE(0xa7),
-									 RANGE16(0, MAX),
-									 FIELD(16, 4),
-									 OUTPUT, /* times */
-									 USAGE(0x52),
-									 RANGE16(0, 255),
-									 FIELD(8, 1),
-									 OUTPUT, /* gain */
-									 USAGE(0x53),
-									 RANGE8(1, 8),
-									 FIELD(8, 1),
-									 OUTPUT, /* button */
-									 USAGE(0x55),
-									 BEGIN(2),
-									 PAGE(0x01),
-									 USAGE(0x30),
-									 RANGE8(0, 1),
-									 FIELD(1, 1),
-									 OUTPUT,
-									 END, /* axis on */
-									 PAGE(0x0f),
-									 USAGE(0x56),
-									 FIELD(1, 1),
-									 OUTPUT,
-									 FIELD(1, 6),
-									 OUTPUT_CONSTANT, /* direction on */
-									 USAGE(0x57),
-									 BEGIN(2),
-									 ORDINAL_1,
-									 RANGE_U16(36000),
-									 FIELD(16, 1),
-									 OUTPUT,
-									 END, /* direction */
-									 USAGE(0x58),
-									 BEGIN(2),
-									 ORDINAL_1,
-									 RANGE16(0, 32765),
-									 FIELD(16, 1),
-									 OUTPUT,
-									 END,
-									 END,
-									 USAGE(0x73),
-									 BEGIN(2),
-									 REPORT(OUT_CONSTANT),
-									 BLOCK_INDEX(OUTPUT),
-									 USAGE(0x70),
-									 RANGE16(-MAX, MAX),
-									 FIELD(16, 1),
-									 OUTPUT,
-									 END,
-									 USAGE(0x77),
-									 BEGIN(2),
-									 REPORT(OUT_OPERATION),
-									 BLOCK_INDEX(OUTPUT),
-									 USAGE(0x78),
-									 BEGIN(2),
-									 USAGE(0x79),
-									 USAGE(0x7a),
-									 USAGE(0x7b),
-									 RANGE8(1, 3),
-									 FIELD(8, 1),
-									 OUTPUT_ARRAY,
-									 END,
-									 USAGE(0x7c),
-									 RANGE16(0, 255),
-									 OUTPUT,
-									 END,
-									 USAGE(0x90),
-									 BEGIN(2),
-									 REPORT(OUT_FREE),
-									 BLOCK_INDEX(OUTPUT),
-									 END,
-									 USAGE(0x95),
-									 BEGIN(2),
-									 REPORT(OUT_CONTROL),
-									 USAGE(0x96),
-									 BEGIN(2),
-									 USAGE(0x97),
-									 USAGE(0x98),
-									 USAGE(0x99),
-									 USAGE(0x9a),
-									 USAGE(0x9b),
-									 USAGE(0x9c),
-									 RANGE8(1, 6),
-									 FIELD(1, 8),
-									 OUTPUT,
-									 END,
-									 END,
-									 USAGE(0x7d),
-									 BEGIN(2),
-									 REPORT(OUT_GAIN),
-									 USAGE(0x7e),
-									 RANGE16(0, 255),
-									 FIELD(8, 1),
-									 OUTPUT,
-									 END,
-									 USAGE(0xab),
-									 BEGIN(2),
-									 REPORT(FEATURE_CREATE),
-									 USAGE(0x25),
-									 BEGIN(2),
-									 EFFECT_TYPES,
-									 FEATURE_ARRAY,
-									 END,
-									 PAGE(0x01),
-									 USAGE(0x3b),
-									 RANGE16(0, 511),
-									 FIELD(10, 1),
-									 FEATURE,
-									 FIELD(6, 1),
-									 0xb1,
-									 0x01, /* bytes */
-									 END,
-									 PAGE(0x0f),
-									 USAGE(0x89),
-									 BEGIN(2),
-									 REPORT(FEATURE_LOADED),
-									 BLOCK_INDEX(FEATURE),
-									 USAGE(0x8b),
-									 BEGIN(2),
-									 USAGE(0x8c),
-									 USAGE(0x8d),
-									 USAGE(0x8e),
-									 RANGE8(1, 3),
-									 FIELD(8, 1),
-									 FEATURE_ARRAY,
-									 END,
-									 USAGE(0xac),
-									 RANGE_U16(0xffff),
-									 FIELD(16, 1),
-									 FEATURE_ARRAY,
-									 END,
-									 USAGE(0x7f),
-									 BEGIN(2),
-									 REPORT(FEATURE_POOL),
-									 USAGE(0x80),
-									 RANGE_U16(0xffff),
-									 FIELD(16, 1),
-									 FEATURE,
-									 USAGE(0x83),
-									 RANGE16(0, 255),
-									 FIELD(8, 1),
-									 FEATURE,
-									 USAGE(0xa9),
-									 USAGE(0xaa),
-									 RANGE8(0, 1),
-									 FIELD(1, 2),
-									 FEATURE,
-									 FIELD(6, 1),
-									 0xb1,
-									 0x03,
-									 END,
-									 END};
-/* clang-format on */
-
-/* ---- state
- * ---- */
+static const uint8_t *describe(size_t *size)
+{
+	return motor_describe(wide, size);
+}
 
 typedef struct {
 	uint8_t type; /* 0: free */
@@ -295,7 +41,8 @@ static struct {
 	/* the axis: turns and turns per second of the encoder, in the direction of X */
 	double position, speed;
 	int64_t moved_ns;
-	uint8_t sent[25];
+	bool wide; /* X has 32 bits */
+	uint8_t sent[27];
 	int64_t sent_ns;
 	bool estop;
 	/* what a test asks for */
@@ -340,6 +87,7 @@ static void plugged(virtual_hid *device)
 	motor.settings[DAMPER] = 30;
 	motor.settings[EFFECT_RATIO] = 204;
 	motor.gain = 255;
+	motor.wide = wide;
 	motor.active = false;
 	motor.powered = true;
 	forget_effects();
@@ -399,8 +147,7 @@ static void move(int64_t now_ns)
 	}
 }
 
-/* ---- commands
- * ---- */
+/* ---- commands ---- */
 
 enum { WRITE = 0, REQUEST = 1, WRITE_ADDRESS = 3, REQUEST_ADDRESS = 4, ACKNOWLEDGE = 10, NOT_FOUND = 13 };
 enum { CLASS_SYSTEM = 0x0000, CLASS_MAIN = 0x0001, CLASS_AXIS = 0x0a01, CLASS_EFFECTS = 0x0a02 };
@@ -499,8 +246,7 @@ static void serve_command(virtual_hid *device, const uint8_t *report)
 	virtual_hid_send(device, answer, COMMAND_SIZE);
 }
 
-/* ---- effects
- * ---- */
+/* ---- effects ---- */
 
 static effect *at(uint8_t block)
 {
@@ -629,8 +375,7 @@ static size_t get_feature(virtual_hid *device, uint8_t *report)
 	return report[0] == FEATURE_LOADED || report[0] == FEATURE_POOL ? 5 : 0;
 }
 
-/* ---- coming and going
- * ---- */
+/* ---- coming and going ---- */
 
 static void opened(virtual_hid *device)
 {
@@ -649,16 +394,20 @@ static void closed(virtual_hid *device)
 /* The position when it changed, and every tenth of a second when not. */
 static void tick(virtual_hid *device, int64_t now_ns)
 {
-	uint8_t report[25] = {IN_POSITION};
+	uint8_t report[27] = {IN_POSITION};
+	size_t n = motor.wide ? 27 : 25;
 	move(now_ns);
-	rig_put16(report + 9, (unsigned)clipped(scaled_position()));
+	if (motor.wide)
+		rig_put32(report + 9, (uint32_t)(int32_t)fmin(fmax(scaled_position() * 65536, INT32_MIN + 1.0), INT32_MAX));
+	else
+		rig_put16(report + 9, (unsigned)clipped(scaled_position()));
 	if (now_ns - motor.sent_ns < 1000000 ||
 		(now_ns - motor.sent_ns < 100000000 && memcmp(report, motor.sent, sizeof(report)) == 0))
 		return;
 	memcpy(motor.sent, report, sizeof(report));
 	motor.sent_ns = now_ns;
 	motor.reports++;
-	virtual_hid_send(device, report, sizeof(report));
+	virtual_hid_send(device, report, n);
 }
 
 /* Without USB the firmware forgets the effects and stops the motor. */
@@ -699,6 +448,10 @@ static bool obey(virtual_hid *device, const char *command, char *answer, size_t 
 		motor.estop = n != 0;
 		return true;
 	}
+	if (sscanf(command, "wide %d", &n) == 1) {
+		wide = n != 0;
+		return true;
+	}
 	if (sscanf(command, "peak %d", &motor.peak) == 1)
 		return true;
 	return sscanf(command, "ignore %lu", &motor.ignore) == 1;
@@ -710,8 +463,7 @@ const virtual_hid_kind virtual_motor = {
 	.serial = "3500440031500420",
 	.vendor = 0x1209,
 	.product = 0xffb0,
-	.descriptor = descriptor,
-	.descriptor_size = sizeof(descriptor),
+	.describe = describe,
 	.opened = opened,
 	.closed = closed,
 	.output = output,

@@ -151,8 +151,7 @@ static uint16_t convert(const daq *d, int channel, unsigned range)
 	return (uint16_t)clamped_code((ideal - (double)float_at(pair + 4)) / (double)float_at(pair));
 }
 
-/* ---- scans
- * ---- */
+/* ---- scans ---- */
 
 static size_t scan_width(const daq *d)
 {
@@ -254,8 +253,7 @@ static void clear_halt(void *context)
 	d->halted = false;
 }
 
-/* ---- requests
- * ---- */
+/* ---- requests ---- */
 
 static int give(uint8_t *data, size_t length, const void *from, size_t n)
 {
@@ -365,22 +363,20 @@ static int control(void *context, const uint8_t setup[8], uint8_t *data, size_t 
 	return answer;
 }
 
-/* ---- identity, power, commands
- * ---- */
+/* ---- identity, power, commands ---- */
 
-/* clang-format off: lines that say what belongs together */
-static const uint8_t device_descriptor[] = {18,   1,    0x00, 0x02,         /* USB 2.0 */
-											0xff, 0,    0xff, USBIP_PACKET, /* vendor class */
-											0xdb, 0x09, 0xea, 0x00,         /* 09db:00ea */
-											0x01, 0x01, 1,    2,
-											3,    1}; /* version, strings, one configuration */
+/* Lines that say what belongs together. */
+/* clang-format off */
+static const uint8_t device_descriptor[] = {
+	18, 1, 0x00, 0x02,           /* USB 2.0 */
+	0xff, 0, 0xff, USBIP_PACKET, /* vendor class */
+	0xdb, 0x09, 0xea, 0x00,      /* 09db:00ea */
+	0x01, 0x01, 1, 2, 3, 1};     /* version, strings, one configuration */
 
-static const uint8_t configuration[] = {9,    2, 25,   0,   1,
-										1,    0, 0x80, 250, /* one interface, bus powered, 500 mA */
-										9,    4, 0,    0,   1,
-										0xff, 0, 0xff, 0, /* vendor class, one endpoint */
-										7,    5, 0x81, 2,   USBIP_PACKET,
-										0,    0}; /* bulk in */
+static const uint8_t configuration[] = {
+	9, 2, 25, 0, 1, 1, 0, 0x80, 250,    /* one interface, bus powered, 500 mA */
+	9, 4, 0, 0, 1, 0xff, 0, 0xff, 0,    /* vendor class, one endpoint */
+	7, 5, 0x81, 2, USBIP_PACKET, 0, 0}; /* bulk in */
 /* clang-format on */
 
 /* As it comes out of its box: lines are inputs, nothing latched. */
