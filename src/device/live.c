@@ -55,7 +55,8 @@ uint64_t tactus_live_expected(double rate_Hz, const tactus_scan_settings *settin
 
 double tactus_live_at_s(const tactus_live *live, int64_t clock_ns)
 {
-	return (double)((clock_ns - live->origin_ns) / 1000) / 1e6; /* microseconds: what is left out is noise */
+	const int64_t microseconds = (clock_ns - live->origin_ns) / 1000; /* what is left out is noise */
+	return (double)microseconds / 1e6;
 }
 
 double tactus_live_now_s(const tactus_live *live)
