@@ -42,6 +42,7 @@ typedef struct {
 	const int *channels; /**< in the order of the scan */
 	size_t channel_count;
 	unsigned modes; /**< TACTUS_MODE_DC | TACTUS_MODE_AC, interleaved per channel */
+	bool realtime;  /**< simulated and replayed devices: pace by the clock */
 	double drive_V; /**< AC peak */
 	double frequency_Hz;
 	double rate_Hz;       /**< scans per second */
@@ -51,7 +52,6 @@ typedef struct {
 	const char *protocol; /**< load to apply (simulated benches only); the scan ends with it */
 	const char *loads;    /**< "standard" or a file: known R ∥ C in place of the sensors (simulated benches only) */
 	uint64_t seed;        /**< simulated benches; 0: the bench's own */
-	bool realtime;        /**< simulated and replayed devices: pace by the clock */
 	double timeout_s;     /**< how long a real device may take to answer one request */
 	double reconnect_s;   /**< how long a lost reference is looked for (INFINITY: without end; the default) */
 } tactus_scan_settings;
