@@ -49,7 +49,7 @@ typedef struct {
 	double settle_s;      /**< after every switch */
 	uint64_t count;       /**< scans; 0: no limit */
 	double duration_s;    /**< NaN: no limit */
-	const char *protocol; /**< load to apply (simulated benches only); the scan ends with it */
+	const char *protocol; /**< load to apply, on a real bench by hand; the scan ends with it */
 	const char *loads;    /**< "standard" or a file: known R ∥ C in place of the sensors (simulated benches only) */
 	uint64_t seed;        /**< simulated benches; 0: the bench's own */
 	double timeout_s;     /**< how long a real device may take to answer one request */
