@@ -84,7 +84,7 @@ int bench_modbus_read(int port, const int *addresses, const int *counts, size_t 
 /* The listener, and its port. */
 int bench_modbus_listen(int *port)
 {
-	struct sockaddr_in address;
+	struct sockaddr_in address = {0};
 	socklen_t size = sizeof(address);
 	modbus_t *context = modbus_new_tcp("127.0.0.1", 0);
 	const int listener = modbus_tcp_listen(context, 4);
