@@ -35,7 +35,7 @@ test_negative_torque_turns_it_down() {
 # What the library says of the position is what the motor did, in both builds of the firmware.
 positions_agree() {
 	hid motor factory
-	exits 0 turn_motor stop 0.25 300
+	exits 0 turn_motor stop 0.25 600
 	cat out
 	hid motor state
 	grep '^position_rad=' out | tr '= ' '  ' | awk -v turns="$(value_of position)" '{ n++; turned = $2 }
