@@ -7,6 +7,7 @@
 
 #include "core/core.h"
 #include "device/device.h"
+#include "device/plan.h"
 #include "device/reference.h"
 #include "device/uri.h"
 
@@ -163,7 +164,7 @@ static int settle_live(tactus_device *device, tactus_scan_settings *settings)
 		return code;
 	settings->duration_s = fmin(settings->duration_s, tactus_protocol_duration_s(protocol));
 	tactus_protocol_free(protocol);
-	return tactus_metadata_set(device->metadata, "protocol", settings->protocol);
+	return tactus_protocol_say(settings->protocol, device->metadata);
 }
 
 int tactus_device_start(tactus_device *device, const tactus_scan_settings *settings)

@@ -1,6 +1,8 @@
 /* What a scan of a bench is: the settings that were asked for and the bench's own, checked together. */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include <tactus/version.h>
 
@@ -100,4 +102,17 @@ int tactus_plan_metadata(const tactus_plan *plan, const char *identity, const ch
 	code = code < 0 || !dc ? code : tactus_metadata_set_number(m, "dc_drive_V", plan->dc_drive_V);
 	code = code < 0 || !ac ? code : tactus_metadata_set_number(m, "frequency_Hz", plan->frequency_Hz);
 	return code < 0 ? code : tactus_metadata_set_number(m, "settle_s", plan->settle_s);
+}
+
+int tactus_protocol_say(const char *protocol, tactus_metadata *metadata)
+{
+	char *line = tactus_strndup(protocol, strlen(protocol));
+	if (line == NULL)
+		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	for (char *c = line; *c != '\0'; c++)
+		if (*c == '\n' || *c == '\r' || *c == '\t')
+			*c = ' ';
+	const int code = tactus_metadata_set(metadata, "protocol", line);
+	free(line);
+	return code;
 }

@@ -23,5 +23,7 @@ int tactus_plan_make(tactus_plan *plan, const tactus_bench *bench, const tactus_
 int tactus_plan_rate(tactus_plan *plan, const tactus_scan_settings *settings, double longest_s);
 /* What a recording says of the scan; start NULL: now. */
 int tactus_plan_metadata(const tactus_plan *plan, const char *identity, const char *start, tactus_metadata *metadata);
+/* The protocol as a recording says it: one of several lines is one line there. */
+int tactus_protocol_say(const char *protocol, tactus_metadata *metadata);
 
 #endif

@@ -76,20 +76,6 @@ static int start_parts(tactus_sim *sim)
 	return code < 0 ? code : allocate_block(sim);
 }
 
-/* A protocol of several lines is one line in a recording. */
-static int set_protocol(tactus_metadata *metadata, const char *protocol)
-{
-	char *line = tactus_strndup(protocol, strlen(protocol));
-	if (line == NULL)
-		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
-	for (char *c = line; *c != '\0'; c++)
-		if (*c == '\n' || *c == '\r' || *c == '\t')
-			*c = ' ';
-	const int code = tactus_metadata_set(metadata, "protocol", line);
-	free(line);
-	return code;
-}
-
 /* What a recording may know; effects of the bench file are not told. */
 static int set_metadata(const tactus_sim *sim, const tactus_scan_settings *settings, tactus_metadata *m)
 {
@@ -102,8 +88,9 @@ static int set_metadata(const tactus_sim *sim, const tactus_scan_settings *setti
 	if (sim->loads != NULL && sim->loads->frequency_count > 1)
 		code = code < 0 ? code : tactus_metadata_set(m, "frequency_Hz", NULL);
 	if (sim->loads == NULL)
-		code =
-			code < 0 ? code : set_protocol(m, settings->protocol != NULL ? settings->protocol : sim->bench->protocol);
+		code = code < 0
+				   ? code
+				   : tactus_protocol_say(settings->protocol != NULL ? settings->protocol : sim->bench->protocol, m);
 	code = code < 0 ? code : tactus_metadata_set_number(m, "seed", (double)sim->seed);
 	return code < 0 ? code : tactus_bench_metadata(sim->bench, plan->modes, m);
 }

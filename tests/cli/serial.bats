@@ -131,6 +131,8 @@ setup_file() {
 	run --separate-stderr tactus scan "serial:$port" --protocol 'hold 5N 100ms' --max-lost 100
 	status_is 0 && says 'apply 5 N'
 	prints '# protocol: hold 5N 100ms'
+	run --separate-stderr tactus scan "serial:$port" --protocol $'hold 5N 50ms,\nrest 50ms' --max-lost 100
+	status_is 0 && prints '# protocol: hold 5N 50ms, rest 50ms'
 	run --separate-stderr tactus scan "serial:$port" --protocol 'hold 5' --max-lost 100
 	status_is 2
 }
