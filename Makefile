@@ -232,7 +232,6 @@ published: all ## error reductions on the simulated bench beside the paper's Tab
 .PHONY: bench
 bench: ## speed against Miller, pandas, numpy and scipy, written to BENCHMARKS.md
 	@scripts/setup --check
-	+@$(parallel) all $(BUILD)/bench_loops.so $(BUILD)/fake_libusb.so
 	@BUILD=$(BUILD) scripts/bench
 
 # Loops that the benchmarks call from Python; the static library, because some of them look inside.
