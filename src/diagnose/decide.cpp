@@ -138,9 +138,10 @@ class Decider
 	explicit Decider(const Evidence &e) : evidence(e), problem(*e.problem)
 	{
 	}
-	Decision run();
+	Decision run(const std::function<bool(const Hypothesis &)> &rejudge);
 
   private:
+	bool begin();
 	bool testable(const tactus_effect *effect) const
 	{
 		return effect->testable(problem.segments.front()) == nullptr;
@@ -618,14 +619,25 @@ enum tactus_verdict Decider::verdict() const
 	return TACTUS_VERDICT_NOTHING_WRONG;
 }
 
-Decision Decider::run()
+/* The base refitted, and the causes that a forward selection finds; false if the base cannot be fitted. */
+bool Decider::begin()
 {
+	d = Decision();
 	d.base = problem.fit(evidence.base, Rows::train);
-	if (!d.base.ok) {
+	if (!d.base.ok)
+		return false;
+	/* Around the base by least squares: weighted by coloured noise, a gross misfit may turn its very sign. */
+	shelf = std::make_unique<Shelf>(problem, evidence.base);
+	select();
+	return true;
+}
+
+Decision Decider::run(const std::function<bool(const Hypothesis &)> &rejudge)
+{
+	if (!begin() || (!d.causes.empty() && rejudge(d.final.hypothesis) && !begin())) {
 		d.verdict = TACTUS_VERDICT_BAD_RECORDING;
 		return d;
 	}
-	shelf = std::make_unique<Shelf>(problem, d.base.hypothesis);
 	const Screen on_base(problem, d.base);
 	for (size_t i = 0; problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
@@ -633,7 +645,6 @@ Decision Decider::run()
 		d.screened.push_back(d.base.hypothesis.has(effect) ? Scored() : on_base.score(*shelf, effect));
 	}
 	d.wrong = map(d.base);
-	select();
 	settle();
 	imprints();
 	adequacy();
@@ -644,9 +655,9 @@ Decision Decider::run()
 
 } // namespace
 
-Decision decide(const Evidence &evidence)
+Decision decide(const Evidence &evidence, const std::function<bool(const Hypothesis &)> &rejudge)
 {
-	return Decider(evidence).run();
+	return Decider(evidence).run(rejudge);
 }
 
 } // namespace tactus::explain

@@ -4,6 +4,7 @@
 
 #include <tactus/diagnose.h>
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -61,7 +62,11 @@ struct Evidence {
 	const tactus_metadata *provenance; /* of the given model, or NULL */
 };
 
-Decision decide(const Evidence &evidence);
+/*
+ * `rejudge` is asked once, with what was found before anything is put in doubt: true if it judged the problem's noise
+ * anew, and all begins again.
+ */
+Decision decide(const Evidence &evidence, const std::function<bool(const Hypothesis &)> &rejudge);
 
 /* Standard errors that a block's paired gain lies above 0: Σ (a − b) over training blocks. */
 double paired(const Problem &problem, const std::vector<double> &a, const std::vector<double> &b);

@@ -33,7 +33,7 @@ class Diagnosis
 	}
 
   private:
-	void noise(Work &work, const VectorXd &y, const Hypothesis &h, bool candidates);
+	void judge(Work &work, Saturated &saturated, const Hypothesis &h, const VectorXd &y);
 	void explain(Work &work);
 	void hold_stated(Work &work, Hypothesis &base) const;
 	int extended();
@@ -47,40 +47,59 @@ class Diagnosis
 	std::unique_ptr<Store> store;
 };
 
-void Diagnosis::noise(Work &work, const VectorXd &y, const Hypothesis &h, bool candidates)
+/* What the model says changes by along each of its parameters. */
+std::vector<VectorXd> own_columns(const Problem &problem, const Hypothesis &h, const VectorXd &y)
 {
-	Problem &problem = *work.problem;
-	std::vector<VectorXd> made;
+	std::vector<VectorXd> columns;
 	for (const Slot &slot : problem.slots(h)) {
 		Hypothesis moved = h;
 		Problem::value(moved, slot) += 1e-3 * slot.scale;
 		VectorXd there;
 		if (problem.simulate(moved, there) && (there - y).norm() > 0)
-			made.push_back(there - y);
+			columns.push_back(there - y);
 	}
-	for (size_t i = 0; candidates && problem.domain->effects[i]; i++) {
+	return columns;
+}
+
+/* And along those of every candidate. */
+std::vector<VectorXd> candidate_columns(const Problem &problem, const Hypothesis &h, const VectorXd &y)
+{
+	std::vector<VectorXd> columns;
+	for (size_t i = 0; problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
 		if (h.has(effect) || effect->testable(problem.segments.front()))
 			continue;
 		Grid grid = grid_of(problem, h, y, effect, 0, true, [](const VectorXd &column) { return column; });
-		std::move(grid.columns.begin(), grid.columns.end(), std::back_inserter(made));
+		std::move(grid.columns.begin(), grid.columns.end(), std::back_inserter(columns));
 	}
-	Columns columns;
-	for (const VectorXd &column : made)
+	return columns;
+}
+
+Saturated::Columns seen(const std::vector<VectorXd> &candidates, const std::vector<Group> &groups)
+{
+	Saturated::Columns columns;
+	for (const VectorXd &column : candidates)
 		columns.emplace_back(column.data(), column.size());
-	for (const Group &group : work.evidence.groups)
+	for (const Group &group : groups)
 		for (Index j = 0; j < group.columns.cols(); j++)
 			columns.emplace_back(group.columns.col(j).data(), group.columns.rows());
+	return columns;
+}
+
+/* The noise as it is if h says all that can be said, y being what h says; wild readings are left out. */
+void Diagnosis::judge(Work &work, Saturated &saturated, const Hypothesis &h, const VectorXd &y)
+{
+	Problem &problem = *work.problem;
+	const std::vector<VectorXd> own = own_columns(problem, h, y);
 	VectorXd left;
-	problem.noise = estimate_noise(problem, y, columns, left);
-	if (!candidates)
-		return;
+	problem.noise = saturated.judge(y, own, left);
 	const std::vector<size_t> outliers = find_outliers(problem, left);
-	if (!outliers.empty()) {
-		work.outliers.insert(work.outliers.end(), outliers.begin(), outliers.end());
-		problem.noise = estimate_noise(problem, y, columns, left);
-		problem.count_training();
-	}
+	if (outliers.empty())
+		return;
+	work.outliers.insert(work.outliers.end(), outliers.begin(), outliers.end());
+	saturated.forget();
+	problem.noise = saturated.judge(y, own, left);
+	problem.count_training();
 }
 
 /* A base parameter that the recording states is the model as given; an effect that does the same holds it there. */
@@ -151,21 +170,22 @@ void Diagnosis::explain(Work &work)
 	VectorXd y;
 	problem.simulate(plain.hypothesis, y);
 	work.evidence.groups = groups_of(problem, gathered.extras(work), y, work.input_name);
-	noise(work, y, plain.hypothesis, true);
 	work.evidence.base = plain.hypothesis;
-	work.decision = decide(work.evidence);
-	/* What a large cause left unlike its form had passed for noise: with the cause there it may be much less. */
-	if (work.decision.base.ok && !work.decision.causes.empty()) {
-		const Noise before = problem.noise;
-		problem.simulate(work.decision.final.hypothesis, y);
-		noise(work, y, work.decision.final.hypothesis, true);
-		bool less = false;
-		for (size_t o = 0; o < problem.output_count; o++)
-			less = less || problem.noise.sigma[o] < limits.less_noise * before.sigma[o];
-		if (less)
-			work.decision = decide(work.evidence);
-		else
+	{
+		const std::vector<VectorXd> candidates = candidate_columns(problem, plain.hypothesis, y);
+		Saturated saturated(problem, seen(candidates, work.evidence.groups));
+		judge(work, saturated, plain.hypothesis, y);
+		/* What a large cause left unlike its form had passed for noise: with the cause there it may be much less. */
+		work.decision = decide(work.evidence, [&](const Hypothesis &found) {
+			const Noise before = problem.noise;
+			problem.simulate(found, y);
+			judge(work, saturated, found, y);
+			for (size_t o = 0; o < problem.output_count; o++)
+				if (problem.noise.sigma[o] < limits.less_noise * before.sigma[o])
+					return true;
 			problem.noise = before;
+			return false;
+		});
 	}
 	const Decision &d = work.decision;
 	if (!d.base.ok)
@@ -173,7 +193,8 @@ void Diagnosis::explain(Work &work)
 	const Fit &last = d.causes.empty() && d.stale ? d.moved.fit : d.final;
 	Hypothesis h = last.hypothesis;
 	problem.simulate(h, y);
-	noise(work, y, h, false);
+	VectorXd left;
+	problem.noise = Saturated(problem, seen({}, work.evidence.groups)).judge(y, own_columns(problem, h, y), left);
 	work.full = problem.fit(h, Rows::all);
 	if (!work.full.ok)
 		work.full = problem.evaluate(h, Rows::all);

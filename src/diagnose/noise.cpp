@@ -10,75 +10,59 @@ namespace tactus::explain
 namespace
 {
 
-/* The most telling columns of one output, of length 1, with the residual last; their own part only. */
-MatrixXd stack_of(const Problem &problem, size_t output, const VectorXd &residual, const Columns &columns)
+using Products = Saturated::Products;
+using Pieces = std::vector<std::pair<Index, Index>>;
+
+const size_t most_columns = 120;
+
+/* Rows of the pieces put together; an outlier is as if it were predicted: of no weight in the sums. */
+void gather(const Problem &problem, const Pieces &pieces, const Eigen::Ref<const VectorXd> &column, double factor,
+			Eigen::Ref<VectorXd> to)
 {
-	std::vector<std::pair<Index, Index>> pieces;
-	Index n = 0;
-	for (const Run &run : problem.runs)
-		if (run.output == output) {
-			pieces.emplace_back(run.first, run.count);
-			n += run.count;
-		}
-	std::vector<std::pair<double, size_t>> order;
-	std::vector<double> size(columns.size());
-	for (size_t j = 0; j < columns.size(); j++) {
-		double square = 0, product = 0;
-		const VectorXd column = columns[j];
-		for (const auto &[first, count] : pieces) {
-			square += column.segment(first, count).squaredNorm();
-			product += column.segment(first, count).dot(residual.segment(first, count));
-		}
-		size[j] = std::sqrt(square);
-		if (size[j] > 0 && std::isfinite(size[j]))
-			order.emplace_back(-std::abs(product) / size[j], j);
-	}
-	std::sort(order.begin(), order.end());
-	order.resize(std::min<size_t>({order.size(), size_t(n / 3), 120}));
-	MatrixXd z(n, Index(order.size()) + 1);
 	Index at = 0;
 	for (const auto &[first, count] : pieces) {
-		for (size_t j = 0; j < order.size(); j++)
-			z.col(Index(j)).segment(at, count) = columns[order[j].second].segment(first, count) / size[order[j].second];
-		z.col(z.cols() - 1).segment(at, count) = residual.segment(first, count);
-		at += count;
-	}
-	at = 0;
-	for (const auto &[first, count] : pieces) { /* an outlier is as if it were predicted: of no weight in the sums */
 		for (Index i = 0; i < count; i++)
-			if (problem.excluded[size_t(first + i)])
-				z.row(at + i).setZero();
+			to[at + i] = problem.excluded[size_t(first + i)] ? 0 : column[first + i] * factor;
 		at += count;
 	}
-	return z;
 }
 
-/* Sums of products of the rows with themselves, with the row before, of the rows before; and of the first rows. */
-struct Products {
-	MatrixXd now, before, cross, first;
-	Index n = 0, runs = 0;
-};
-
-Products products_of(const Problem &problem, size_t output, const MatrixXd &z)
+/* Sums of products of z's columns; those of the leading ones are known. */
+Products products_of(const Pieces &pieces, const MatrixXd &z, const Products &known)
 {
-	const Index q = z.cols();
-	Products p{MatrixXd::Zero(q, q), MatrixXd::Zero(q, q), MatrixXd::Zero(q, q), MatrixXd::Zero(q, q), z.rows(), 0};
-	p.now.selfadjointView<Eigen::Lower>().rankUpdate(z.transpose());
-	p.now.triangularView<Eigen::StrictlyUpper>() = p.now.transpose();
-	p.before = p.now;
+	const Index q = z.cols(), old = known.now.cols(), fresh = q - old;
+	const MatrixXd none = MatrixXd::Zero(q, q);
+	Products p{none, none, none, none, z.rows(), Index(pieces.size())};
+	MatrixXd pairs = none, ends = none; /* Σ (z + the row before)² = now + before + cross: half the work of cross */
+	p.now.topLeftCorner(old, old) = known.now;
+	pairs.topLeftCorner(old, old) = known.now + known.before + known.cross;
+	auto add = [&](const auto &rows, MatrixXd &to) {
+		to.bottomRightCorner(fresh, fresh)
+			.selfadjointView<Eigen::Lower>()
+			.rankUpdate(rows.rightCols(fresh).transpose());
+		to.bottomLeftCorner(fresh, old).noalias() += rows.rightCols(fresh).transpose() * rows.leftCols(old);
+	};
 	Index at = 0;
-	for (const Run &run : problem.runs) {
-		if (run.output != output)
-			continue;
-		const auto piece = z.middleRows(at, run.count);
-		p.cross.noalias() += piece.bottomRows(run.count - 1).transpose() * piece.topRows(run.count - 1);
-		p.first += piece.row(0).transpose() * piece.row(0);
-		p.before -= piece.row(run.count - 1).transpose() * piece.row(run.count - 1);
-		at += run.count;
-		p.runs++;
+	for (const auto &[first, count] : pieces) {
+		const auto rows = z.middleRows(at, count);
+		const MatrixXd pair = rows.bottomRows(count - 1) + rows.topRows(count - 1);
+		add(rows.bottomRows(count - 1), p.now);
+		add(pair, pairs);
+		p.first += rows.row(0).transpose() * rows.row(0);
+		ends += rows.row(count - 1).transpose() * rows.row(count - 1);
+		at += count;
 	}
-	p.now -= p.first; /* rows that have one before them */
+	for (MatrixXd *sums : {&p.now, &pairs})
+		sums->triangularView<Eigen::StrictlyUpper>() = sums->transpose();
+	p.before = p.now + p.first - ends;
+	p.cross = pairs - p.now - p.before;
 	return p;
+}
+
+Products leading(const Products &p, Index q)
+{
+	auto corner = [&](const MatrixXd &sums) { return MatrixXd(sums.topLeftCorner(q, q)); };
+	return {corner(p.now), corner(p.before), corner(p.cross), corner(p.first), p.n, p.runs};
 }
 
 /* Turns z into orthonormal columns, as many as are independent, and the last one, which stays: z times the result. */
@@ -111,7 +95,7 @@ Products turned(const Products &p, const MatrixXd &turn)
 /* −2 × restricted log likelihood of an AR(1) process, and what the regression then gives. */
 double restricted(const Products &p, double phi, double *square, VectorXd *coefficients)
 {
-	MatrixXd g = p.now - phi * (p.cross + p.cross.transpose()) + phi * phi * p.before + (1 - phi * phi) * p.first;
+	MatrixXd g = p.now - phi * p.cross + phi * phi * p.before + (1 - phi * phi) * p.first;
 	const Index q = g.cols() - 1;
 	const Eigen::LLT<MatrixXd> factor(g.topLeftCorner(q, q) + 1e-12 * MatrixXd::Identity(q, q));
 	const VectorXd b = factor.solve(g.topRightCorner(q, 1));
@@ -226,7 +210,44 @@ double spread_of(const std::vector<double> &a)
 
 } // namespace
 
-Noise estimate_noise(const Problem &problem, const VectorXd &y, const Columns &columns, VectorXd &left)
+Saturated::Saturated(const Problem &p, Columns c) : problem(p), columns(std::move(c)), outputs(p.output_count)
+{
+	for (const Run &run : problem.runs)
+		outputs[run.output].pieces.emplace_back(run.first, run.count);
+}
+
+void Saturated::forget()
+{
+	for (Output &output : outputs)
+		output.z.resize(0, 0);
+}
+
+void Saturated::choose(Output &output, const VectorXd &residual) const
+{
+	Index n = 0;
+	for (const auto &[first, count] : output.pieces)
+		n += count;
+	std::vector<std::pair<double, size_t>> order;
+	std::vector<double> size(columns.size());
+	for (size_t j = 0; j < columns.size(); j++) {
+		double square = 0, product = 0;
+		for (const auto &[first, count] : output.pieces) {
+			square += columns[j].segment(first, count).squaredNorm();
+			product += columns[j].segment(first, count).dot(residual.segment(first, count));
+		}
+		size[j] = std::sqrt(square);
+		if (size[j] > 0 && std::isfinite(size[j]))
+			order.emplace_back(-std::abs(product) / size[j], j);
+	}
+	std::sort(order.begin(), order.end());
+	order.resize(std::min<size_t>({order.size(), size_t(n / 3), most_columns}));
+	output.z.resize(n, Index(order.size()));
+	for (size_t j = 0; j < order.size(); j++)
+		gather(problem, output.pieces, columns[order[j].second], 1 / size[order[j].second], output.z.col(Index(j)));
+	output.sums = products_of(output.pieces, output.z, {});
+}
+
+Noise Saturated::judge(const VectorXd &y, const std::vector<VectorXd> &own, VectorXd &left)
 {
 	Noise noise;
 	const VectorXd residual = problem.measured - y;
@@ -237,8 +258,19 @@ Noise estimate_noise(const Problem &problem, const VectorXd &y, const Columns &c
 	for (size_t o = 0; o < problem.output_count; o++) {
 		if (!problem.outputs[o])
 			continue;
-		const MatrixXd z = stack_of(problem, o, residual, columns);
-		const Products sums = products_of(problem, o, z);
+		Output &output = outputs[o];
+		if (output.z.rows() == 0)
+			choose(output, residual);
+		const Index n = output.z.rows(), most = std::min<Index>(n / 3, Index(most_columns)),
+					added = std::min<Index>(Index(own.size()), most), kept = std::min(output.z.cols(), most - added);
+		MatrixXd z(n, kept + added + 1);
+		z.leftCols(kept) = output.z.leftCols(kept);
+		for (Index j = 0; j < added; j++) {
+			gather(problem, output.pieces, own[size_t(j)], 1, z.col(kept + j));
+			z.col(kept + j) /= std::fmax(z.col(kept + j).norm(), 1e-300);
+		}
+		gather(problem, output.pieces, residual, 1, z.col(kept + added));
+		const Products sums = products_of(output.pieces, z, leading(output.sums, kept));
 		const MatrixXd turn = independent(sums);
 		const Products p = turned(sums, turn);
 		double phi = p.n > 30 && !sorted_by_input(problem, o) ? best_phi(p) : 0;
@@ -262,11 +294,10 @@ Noise estimate_noise(const Problem &problem, const VectorXd &y, const Columns &c
 		noise.sigma[o] = std::sqrt(std::fmax(w.squaredNorm() / double(std::max<Index>(p.n - b.size(), 1)), 1e-30));
 		noise.spread[o] = noise.sigma[o] * spread_of(noise.a[o]);
 		Index at = 0;
-		for (const Run &run : problem.runs)
-			if (run.output == o) {
-				left.segment(run.first, run.count) = e.segment(at, run.count);
-				at += run.count;
-			}
+		for (const auto &[first, count] : output.pieces) {
+			left.segment(first, count) = e.segment(at, count);
+			at += count;
+		}
 	}
 	return noise;
 }

@@ -8,13 +8,43 @@ namespace tactus::explain
 {
 
 /*
- * Autoregressive noise of every output, from the residual of a saturated fit: `columns` span the base, the candidates
+ * Autoregressive noise of every output, from the residual of a saturated fit: its columns span the base, the candidates
  * and smooth functions of all covariates. The first coefficient maximises the restricted likelihood (Patterson &
  * Thompson 1971), which does not mistake for signal what so many columns take out of slow noise; further ones are
- * Yule–Walker's of what it leaves. left receives the residual of that fit, scaled, at the rows.
+ * Yule–Walker's of what it leaves.
  */
-using Columns = std::vector<Eigen::Map<const VectorXd>>;
-Noise estimate_noise(const Problem &problem, const VectorXd &y, const Columns &columns, VectorXd &left);
+class Saturated
+{
+  public:
+	using Columns = std::vector<Eigen::Map<const VectorXd>>;
+
+	Saturated(const Problem &problem, Columns columns);
+	/*
+	 * The noise if the model says y. Each output keeps the columns that told most when it was first asked; `own` are
+	 * the model's, always among them. left receives the residual of the fit, scaled, at the rows.
+	 */
+	Noise judge(const VectorXd &y, const std::vector<VectorXd> &own, VectorXd &left);
+	/* Rows were excluded since: everything is summed again. */
+	void forget();
+
+	/* Sums of products of the rows with themselves, of the rows before, of both with each other; of the first rows. */
+	struct Products {
+		MatrixXd now, before, cross, first; /* cross: with its transpose */
+		Index n = 0, runs = 0;
+	};
+
+  private:
+	struct Output {
+		std::vector<std::pair<Index, Index>> pieces; /* first row and count of its runs */
+		MatrixXd z;                                  /* its columns of length 1, at its rows; empty: not yet chosen */
+		Products sums;                               /* of z */
+	};
+	void choose(Output &output, const VectorXd &residual) const;
+
+	const Problem &problem;
+	const Columns columns;
+	std::vector<Output> outputs;
+};
 
 /*
  * The same before anything is fitted, for readings so far off that they would set the scale of everything: far from the
