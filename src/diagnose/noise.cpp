@@ -14,6 +14,7 @@ using Products = Saturated::Products;
 using Pieces = std::vector<std::pair<Index, Index>>;
 
 const size_t most_columns = 120;
+const Index chunk = 512; /* rows at a time: they stay in the cache */
 
 /* Rows of the pieces put together; an outlier is as if it were predicted: of no weight in the sums. */
 void gather(const Problem &problem, const Pieces &pieces, const Eigen::Ref<const VectorXd> &column, double factor,
@@ -45,9 +46,11 @@ Products products_of(const Pieces &pieces, const MatrixXd &z, const Products &kn
 	Index at = 0;
 	for (const auto &[first, count] : pieces) {
 		const auto rows = z.middleRows(at, count);
-		const MatrixXd pair = rows.bottomRows(count - 1) + rows.topRows(count - 1);
-		add(rows.bottomRows(count - 1), p.now);
-		add(pair, pairs);
+		for (Index i = 1; i < count; i += chunk) {
+			const Index m = std::min(chunk, count - i);
+			add(rows.middleRows(i, m), p.now);
+			add(MatrixXd(rows.middleRows(i, m) + rows.middleRows(i - 1, m)), pairs);
+		}
 		p.first += rows.row(0).transpose() * rows.row(0);
 		ends += rows.row(count - 1).transpose() * rows.row(count - 1);
 		at += count;
