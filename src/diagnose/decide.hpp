@@ -63,8 +63,8 @@ struct Evidence {
 };
 
 /*
- * `rejudge` is asked once, with what was found before anything is put in doubt: true if it judged the problem's noise
- * anew, and all begins again.
+ * `rejudge` is asked once, with what was found before anything is put in doubt: true if the problem's noise
+ * or its rows are others since, and all begins again.
  */
 Decision decide(const Evidence &evidence, const std::function<bool(const Hypothesis &)> &rejudge);
 

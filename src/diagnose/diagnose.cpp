@@ -178,13 +178,15 @@ void Diagnosis::explain(Work &work)
 		/* What a large cause left unlike its form had passed for noise: with the cause there it may be much less. */
 		work.decision = decide(work.evidence, [&](const Hypothesis &found) {
 			const Noise before = problem.noise;
+			const size_t wild = work.outliers.size();
 			problem.simulate(found, y);
 			judge(work, saturated, found, y);
+			bool less = false;
 			for (size_t o = 0; o < problem.output_count; o++)
-				if (problem.noise.sigma[o] < limits.less_noise * before.sigma[o])
-					return true;
-			problem.noise = before;
-			return false;
+				less = less || problem.noise.sigma[o] < limits.less_noise * before.sigma[o];
+			if (!less)
+				problem.noise = before;
+			return less || work.outliers.size() > wild; /* fewer rows: what was gathered of them no longer fits */
 		});
 	}
 	const Decision &d = work.decision;
