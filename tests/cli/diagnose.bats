@@ -433,6 +433,51 @@ made() {
 	tactus diagnose wild.csv | head -1 | grep -q '^Problem'
 }
 
+@test "readings that are wild only once the cause is known: codes a step off what they should be" {
+	cat >loads.toml <<-'EOM'
+		kind = "model"
+		format = 1
+		domain = "readout"
+		form = "forward"
+		[output.amplitude_V]
+		[base]
+		gain_resistor_ohm = 1000
+		[[channel]]
+		channel = 1
+		[channel.reading.amplitude_V]
+		residual_std = 0.0016
+	EOM
+	awk 'BEGIN { srand(5); n = split("470 1000 2200 4700 10000", r, " ")
+		print "# gain_resistor_ohm: 1000"
+		print "time_s,sequence,channel,reference_resistance_ohm,reference_capacitance_F,frequency_Hz,drive_V"
+		for (i = 0; i < 2000; i++)
+			printf "%g,%d,1,%s,2.2e-10,%d,%.5f\n", i / 20, i, r[1 + int(n * rand())], 500 * 2 ^ int(5 * rand()),
+				2 ^ int(3 * rand() - 1) * (1 + 0.001 * rand()) }' >inputs.csv
+	tactus simulate -q -m loads.toml inputs.csv --noise --seed 1 -o readings.csv
+	awk -F, -v OFS=, '/^#/ { print; next } named++ { $NF = 0.04 * int($NF / 0.04 + 0.5) } 1' readings.csv >codes.csv
+	tactus diagnose codes.csv --json >said.json
+	jq -e '.series[0].causes[0].effect == "adc-quantisation"' said.json
+	jq -e 'any(.problems[]; .kind == "outliers")' said.json
+}
+
+@test "a reference that lags under one ramp and a sudden release is no step of the sensor" {
+	cat >late.toml <<-'EOB'
+		kind = "bench"
+		base = "paredes"
+		[reference]
+		latency_s = 0.5
+		[scan]
+		rate_Hz = 4
+	EOB
+	for seed in 1 2 3; do
+		tactus scan sim:late.toml --seed $seed --protocol 'ramp 0N..100N 10s, hold 0N 5s' --mode dc --channels 1 -q |
+			tactus convert -q -o late.csv --overwrite
+		tactus diagnose late.csv --json >said.json
+		jq -e '[.series[0].causes[].effect] == ["time-offset"]' said.json
+		jq -e '.series[0].causes[0].parameters[0].value | . > -0.51 and . < -0.49' said.json
+	done
+}
+
 @test "colour on a terminal, but not with NO_COLOR" {
 	type script >/dev/null || skip "script(1) is not installed"
 	TERM=xterm script -qec "tactus diagnose $creep" /dev/null >on
