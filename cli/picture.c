@@ -89,7 +89,7 @@ static void put_axis(FILE *script, const char *which, const struct axis *axis)
 		least = most = 0;
 	if (axis->logarithmic) {
 		double room = pow(most / least, 0.03);
-		fprintf(script, "set logscale %s 10\nset format %s '10^%%T'\nset %srange [%.9g:%.9g]\n", which, which, which,
+		fprintf(script, "set logscale %s 10\nset format %s '10^{%%T}'\nset %srange [%.9g:%.9g]\n", which, which, which,
 				least / room, most * room);
 	} else {
 		double room =

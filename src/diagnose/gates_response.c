@@ -52,7 +52,10 @@ static int by_expected(const void *a, const void *b)
 	return (p->expected > q->expected) - (p->expected < q->expected);
 }
 
-/* Share of the output's variance between bins of what is expected (correlation ratio); −1 without memory. */
+/*
+ * Share of the output's variance between bins of what is expected (correlation ratio); −1 without memory. Samples that
+ * expect the same are in one bin: apart they would be sorted by time, and any jump of the output would look like a response.
+ */
 static double ratio(const tactus_gate_view *v)
 {
 	point *points = malloc(v->n * sizeof *points);
@@ -66,9 +69,14 @@ static double ratio(const tactus_gate_view *v)
 	for (size_t k = 0; k < v->n; k++)
 		total += (v->x[k] - mean) * (v->x[k] - mean);
 	qsort(points, v->n, sizeof *points, by_expected);
-	for (size_t b = 0; b < BINS; b++) {
-		size_t first = b * v->n / BINS, end = (b + 1) * v->n / BINS;
+	for (size_t b = 0, first = 0, end = 0; b < BINS; b++, first = end) {
 		double sum = 0;
+		end = (b + 1) * v->n / BINS;
+		end = end > first ? end : first;
+		while (end > first && end < v->n && points[end].expected == points[end - 1].expected)
+			end++;
+		if (end == first)
+			continue;
 		for (size_t k = first; k < end; k++)
 			sum += points[k].x - mean;
 		between += sum * sum / (double)(end - first);
