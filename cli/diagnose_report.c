@@ -56,9 +56,11 @@ static void cards(const struct html *html, const tactus_diagnosed *series)
 		card(html, cli_of_noise(base, text), "the noise floor");
 	}
 	if (gain && isfinite(gain->force_rmse_after_N))
-		card(html, cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", 2, text), "off once extended");
+		card(html, cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", 2, text),
+			 gain->no_force_gain ? "once extended: worse in force" : "off once extended");
 	if (gain) {
-		card(html, cli_percent(gain->reduction, text), "less error on unseen data");
+		card(html, cli_percent(gain->reduction, text),
+			 gain->no_force_gain ? "less error of the reading, unseen" : "less error on unseen data");
 		card(html, cli_percent(gain->of_explainable, text), "of what can be explained");
 	}
 	fputs("</ul>\n", html->out);

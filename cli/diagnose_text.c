@@ -189,6 +189,32 @@ static void say_rivals(const struct page *page, const tactus_diagnosed *series)
 	page_item(page, cause->inseparable ? "Rivals" : "Considered", "%s.", words.text);
 }
 
+/* Better readings that are worse newtons are no gain: said apart, and why; channels of one reason together. */
+static void say_no_force_gain(const struct page *page)
+{
+	const tactus_diagnosis *d = page->diagnosis;
+	for (size_t i = 0; i < d->series_count; i++) {
+		const char *why = cli_no_force_gain(&d->series[i]);
+		struct words words = {0};
+		bool said = false;
+		for (size_t k = 0; why && k < d->series_count; k++) {
+			const tactus_gain *gain = d->series[k].gain;
+			const char *same = cli_no_force_gain(&d->series[k]);
+			char before[64], after[64];
+			if (!same || strcmp(same, why) != 0)
+				continue;
+			said = said || k < i;
+			words_add(&words, "%s", words.length ? ", " : "");
+			if (d->series_count > 1)
+				words_add(&words, "%s%d: ", words.length ? "" : "channel ", d->series[k].channel);
+			words_add(&words, "%s → %s", cli_si(gain->force_rmse_before_N, "N", 2, before),
+					  cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", 2, after));
+		}
+		if (why && !said)
+			page_item(page, "Beware", "in newtons the error grows on these (%s): %s.", words.text, why);
+	}
+}
+
 static void say_gain(const struct page *page, const tactus_diagnosed *series)
 {
 	const tactus_gain *gain = series->gain;
@@ -196,7 +222,7 @@ static void say_gain(const struct page *page, const tactus_diagnosed *series)
 	struct words words = {0};
 	if (!gain)
 		return;
-	if (isfinite(gain->force_rmse_before_N))
+	if (isfinite(gain->force_rmse_before_N) && !cli_no_force_gain(series))
 		words_add(&words, "%s → %s; ", cli_si(gain->force_rmse_before_N, "N", 2, before),
 				  cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", 2, after));
 	words_add(&words, "%s %s → %s, %s less (95 %%: %s to %s)", cli_quantity_name(gain->output, quantity),
@@ -207,6 +233,7 @@ static void say_gain(const struct page *page, const tactus_diagnosed *series)
 		words_add(&words, "; %s of what can be explained", cli_percent(gain->of_explainable, share));
 	page_item(page, "Gain", "on %s%s%s that no choice has seen: %s.", gain->blocks ? "" : "the ",
 			  gain->blocks ? "held-out " : "", gain->held_out ? gain->held_out : "data", words.text);
+	say_no_force_gain(page);
 }
 
 static void say_rest(const struct page *page, const tactus_diagnosed *series)
@@ -259,6 +286,14 @@ static const tactus_experiment *first_experiment(const tactus_diagnosis *diagnos
 	return NULL;
 }
 
+static bool worse_in_newtons(const tactus_diagnosis *diagnosis)
+{
+	for (size_t i = 0; i < diagnosis->series_count; i++)
+		if (cli_no_force_gain(&diagnosis->series[i]))
+			return true;
+	return false;
+}
+
 static void command_line(const struct page *page, const char *command)
 {
 	page_emphasis(page, "\033[1m");
@@ -289,10 +324,14 @@ static void say_next(const struct page *page)
 		page_item(page, "Next", "look at the recording: `tactus show` says what is in it.");
 	} else if (extends && !extended) {
 		again_with(page,
-				   "write the extended model; `force`, `simulate` and `fit` accept it:", "--extended extended.toml");
+				   worse_in_newtons(page->diagnosis)
+					   ? "write the extended model, for `simulate` rather than for `force`:"
+					   : "write the extended model; `force`, `simulate` and `fit` accept it:",
+				   "--extended extended.toml");
 	} else if (extends) {
-		page_item(page, "Next", "the extended model is in %s; give it to `force`, `simulate` or `fit` with -m.",
-				  extended);
+		page_item(page, "Next", "the extended model is in %s; give it to %s.", extended,
+				  worse_in_newtons(page->diagnosis) ? "`simulate` with -m, rather than to `force`"
+													: "`force`, `simulate` or `fit` with -m");
 	} else if (verdict == TACTUS_VERDICT_NOTHING_WRONG) {
 		page_item(page, "Next", "nothing to do: the model is as good as this recording can show.");
 	} else if (!report) {
@@ -358,6 +397,7 @@ static void page_several(const struct page *page)
 	page_item(page, "Measured", "%s (%s, %zu channels). Channel by channel:", recordings_name(page->diagnosis, name),
 			  page->diagnosis->domain, page->diagnosis->series_count);
 	print_table(page);
+	say_no_force_gain(page);
 	say_next(page);
 }
 

@@ -211,3 +211,8 @@ const tactus_base_error *cli_worst_base(const tactus_diagnosed *series)
 	}
 	return worst;
 }
+
+const char *cli_no_force_gain(const tactus_diagnosed *series)
+{
+	return series->gain ? series->gain->no_force_gain : NULL;
+}

@@ -258,6 +258,11 @@ static void gain(const struct html *html, const tactus_diagnosed *series, size_t
 				".series[%zu].gain.force_rmse_after_N", s);
 	fputs("</tr>\n", html->out);
 	html_table_end(html);
+	if (g->no_force_gain) {
+		fputs("<p class=\"warn\">In newtons the error grows on these: ", html->out);
+		html_text(html, g->no_force_gain);
+		fputs(".</p>\n", html->out);
+	}
 }
 
 static void unexplained(const struct html *html, const tactus_diagnosed *series, size_t s)

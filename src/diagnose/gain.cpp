@@ -13,18 +13,19 @@ namespace tactus::explain
 namespace
 {
 
-/* Squares and counts of one output per held-out block. */
+/* Squares and counts of one output per block: of those held out, or of the others. */
 struct Blocks {
 	std::vector<double> square, count;
 };
 
-Blocks blocks_of(const Problem &problem, size_t output, const VectorXd &residual)
+Blocks blocks_of(const Problem &problem, size_t output, const VectorXd &residual, bool held_out = true)
 {
 	Blocks b{std::vector<double>(size_t(problem.block_count), 0), std::vector<double>(size_t(problem.block_count), 0)};
 	for (const Run &run : problem.runs)
 		for (Index i = run.first; run.output == output && i < run.first + run.count; i++) {
 			const int k = problem.block[size_t(i)];
-			if (k < 0 || !problem.test[size_t(k)] || problem.excluded[size_t(i)] || !std::isfinite(residual[i]))
+			if (k < 0 || problem.test[size_t(k)] != held_out || problem.excluded[size_t(i)] ||
+				!std::isfinite(residual[i]))
 				continue;
 			b.square[size_t(k)] += residual[i] * residual[i];
 			b.count[size_t(k)]++;
@@ -40,6 +41,21 @@ double rmse(const Blocks &b)
 		count += b.count[k];
 	}
 	return count > 0 ? std::sqrt(square / count) : NAN;
+}
+
+/* The output that gains most, chosen where everything else was: the held-out blocks have not seen it. */
+size_t best_output(const Problem &problem, const VectorXd &before, const VectorXd &after)
+{
+	size_t best = 0;
+	double most = -INFINITY;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const double gain = 1 - rmse(blocks_of(problem, o, after, false)) / rmse(blocks_of(problem, o, before, false));
+		if (problem.outputs[o] && gain > most) {
+			most = gain;
+			best = o;
+		}
+	}
+	return best;
 }
 
 /*
@@ -90,20 +106,25 @@ struct ModelFree {
 	}
 };
 
-/* Root mean square of estimate − reference over the held-out samples, readings taken one by one as they came. */
-double force_rmse(const Work &work, const Hypothesis &h)
+/* Estimate − reference over the held-out samples, readings taken one by one as they came. */
+struct ForceErrors {
+	double rmse = NAN;
+	double quick = NAN; /* what changes from one sample to the next, as noise does */
+};
+
+ForceErrors force_errors(const Work &work, const Hypothesis &h)
 {
 	const Problem &problem = *work.problem;
 	if (!work.newtons())
-		return NAN;
+		return {};
 	const std::unique_ptr<tactus_model, ModelFree> model(model_of(work, h, problem.noise));
 	if (!model || tactus_model_whole(model.get()))
-		return NAN; /* coupled channels are not solved one by one */
-	double square = 0, count = 0;
+		return {}; /* coupled channels are not solved one by one */
+	double square = 0, count = 0, change = 0, changes = 0;
 	for (size_t segment = 0; segment < problem.segments.size(); segment++) {
 		tactus_estimator *made = nullptr;
 		if (tactus_estimator_new(model.get(), &made) != TACTUS_OK)
-			return NAN;
+			return {};
 		const std::unique_ptr<tactus_estimator, EstimatorFree> estimator(made);
 		const tactus_series *s = problem.segments[segment];
 		std::vector<int> held(s->n, -1); /* 1: judged, 0: only fed */
@@ -113,6 +134,7 @@ double force_rmse(const Work &work, const Hypothesis &h)
 				int &at = held[problem.sample[size_t(i)]];
 				at = std::max(at, k >= 0 && problem.test[size_t(k)] && !problem.excluded[size_t(i)] ? 1 : 0);
 			}
+		double last = NAN;
 		auto value = [&](size_t signal, size_t i, double otherwise) {
 			return s->signal[signal] ? s->signal[signal][i] : otherwise;
 		};
@@ -132,13 +154,65 @@ double force_rmse(const Work &work, const Hypothesis &h)
 			sample.ac = value(SENSOR_FREQUENCY, i, 0) > 0;
 			tactus_force force;
 			if (tactus_estimator_sample(estimator.get(), &sample, &force) != TACTUS_OK || held[i] != 1 ||
-				!std::isfinite(force.force_N))
+				!std::isfinite(force.force_N)) {
+				last = NAN;
 				continue;
-			square += std::pow(force.force_N - value(SENSOR_FORCE, i, NAN), 2);
+			}
+			const double error = force.force_N - value(SENSOR_FORCE, i, NAN);
+			square += error * error;
 			count++;
+			if (std::isfinite(error - last)) {
+				change += (error - last) * (error - last) / 2;
+				changes++;
+			}
+			last = error;
 		}
 	}
-	return count > 0 ? std::sqrt(square / count) : NAN;
+	ForceErrors errors;
+	if (count > 0)
+		errors.rmse = std::sqrt(square / count);
+	if (changes > 0)
+		errors.quick = std::sqrt(change / changes);
+	return errors;
+}
+
+/* How far the load strays from its mean within the held-out blocks, as a share of its range. */
+double load_moves(const Problem &problem)
+{
+	const VectorXd x = problem.at_rows(problem.input_signal());
+	const size_t blocks = size_t(problem.block_count);
+	std::vector<double> sum(blocks, 0), square(blocks, 0), n(blocks, 0);
+	for (size_t i = 0; i < problem.block.size(); i++) {
+		const int k = problem.block[i];
+		if (k < 0 || !problem.test[size_t(k)] || !std::isfinite(x[Index(i)]))
+			continue;
+		const double share = x[Index(i)] / problem.input_range;
+		sum[size_t(k)] += share;
+		square[size_t(k)] += share * share;
+		n[size_t(k)]++;
+	}
+	double within = 0, count = 0;
+	for (size_t k = 0; k < blocks; k++)
+		if (n[k] > 0) {
+			within += square[k] - sum[k] * sum[k] / n[k];
+			count += n[k];
+		}
+	return count > 0 ? std::sqrt(std::fmax(within, 0) / count) : 0;
+}
+
+/* Why newtons get worse while readings are simulated better; NULL where they do not. */
+const char *no_force_gain(const Problem &problem, const ForceErrors &before, const ForceErrors &after)
+{
+	if (!(after.rmse > 1.02 * before.rmse))
+		return nullptr;
+	if (load_moves(problem) < 0.02)
+		return "the load hardly moves there, so nothing tells a change of sensitivity from one of offset; record loads "
+			   "that rise and fall";
+	if (after.quick > 0.7 * after.rmse)
+		return "the extended model answers less to the load, and its inverse amplifies the noise of the readings";
+	return "read backwards, sample by sample, the model goes by its own earlier estimates and cannot know what is "
+		   "still "
+		   "to come";
 }
 
 } // namespace
@@ -158,17 +232,7 @@ const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, s
 		return nullptr;
 	before = problem.measured - before;
 	after = problem.measured - after;
-	size_t output = 0;
-	double most = -INFINITY;
-	for (size_t o = 0; o < problem.output_count; o++) {
-		if (!problem.outputs[o])
-			continue;
-		const double gain = 1 - rmse(blocks_of(problem, o, after)) / rmse(blocks_of(problem, o, before));
-		if (gain > most) {
-			most = gain;
-			output = o;
-		}
-	}
+	const size_t output = best_output(problem, before, after);
 	const Blocks b = blocks_of(problem, output, before), a = blocks_of(problem, output, after);
 	tactus_gain gain{};
 	gain.output = store.text(work.output_name[output]);
@@ -181,8 +245,10 @@ const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, s
 	const double explainable = gain.rmse_before * gain.rmse_before - floor * floor;
 	gain.of_explainable =
 		explainable > 0 ? (gain.rmse_before * gain.rmse_before - gain.rmse_after * gain.rmse_after) / explainable : NAN;
-	gain.force_rmse_before_N = force_rmse(work, old);
-	gain.force_rmse_after_N = force_rmse(work, next);
+	const ForceErrors force_before = force_errors(work, old), force_after = force_errors(work, next);
+	gain.force_rmse_before_N = force_before.rmse;
+	gain.force_rmse_after_N = force_after.rmse;
+	gain.no_force_gain = no_force_gain(problem, force_before, force_after);
 	gain.blocks = size_t(std::count_if(b.count.begin(), b.count.end(), [](double c) { return c > 0; }));
 	gain.held_out = problem.whole_recordings ? "recordings" : "stretches";
 	for (const Cause &cause : d.causes) {
@@ -194,18 +260,11 @@ const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, s
 			continue;
 		}
 		without = problem.measured - without;
-		double best = -INFINITY, low = NAN, high = NAN;
-		for (size_t o = 0; o < problem.output_count; o++) {
-			if (!problem.outputs[o])
-				continue;
-			const Blocks w = blocks_of(problem, o, without), f = blocks_of(problem, o, after);
-			const double here = 1 - rmse(f) / rmse(w);
-			if (here > best) {
-				best = here;
-				bootstrap(w, f, seed, &low, &high);
-			}
-		}
-		per_cause->push_back(best);
+		const size_t o = best_output(problem, without, after);
+		const Blocks w = blocks_of(problem, o, without), f = blocks_of(problem, o, after);
+		double low, high;
+		bootstrap(w, f, seed, &low, &high);
+		per_cause->push_back(1 - rmse(f) / rmse(w));
 		per_cause_low->push_back(low);
 		per_cause_high->push_back(high);
 	}

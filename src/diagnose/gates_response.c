@@ -54,7 +54,8 @@ static int by_expected(const void *a, const void *b)
 
 /*
  * Share of the output's variance between bins of what is expected (correlation ratio); −1 without memory. Samples that
- * expect the same are in one bin: apart they would be sorted by time, and any jump of the output would look like a response.
+ * expect the same are in one bin: apart they would be sorted by time, and any jump of the output would look like a
+ * response.
  */
 static double ratio(const tactus_gate_view *v)
 {

@@ -367,8 +367,9 @@ std::string summary_of(const tactus_diagnosed &s)
 				 100 * s.gain->reduction);
 		gain = buffer;
 		if (std::isfinite(s.gain->force_rmse_before_N)) {
-			snprintf(buffer, sizeof buffer, " (%.3g N to %.3g N)", s.gain->force_rmse_before_N,
-					 s.gain->force_rmse_after_N);
+			snprintf(buffer, sizeof buffer,
+					 s.gain->no_force_gain ? ", but grows in newtons (%.3g N to %.3g N)" : " (%.3g N to %.3g N)",
+					 s.gain->force_rmse_before_N, s.gain->force_rmse_after_N);
 			gain += buffer;
 		}
 	}

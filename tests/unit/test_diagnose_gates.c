@@ -265,7 +265,8 @@ static void an_input_that_never_moves_is_fatal(void **unused)
 		values(table, "conductance_S")[i] = 5e-5 + 1e-8 * (double)i; /* it drifts all the same */
 	}
 	expect(table, "input-never-moves", 1, true, SAMPLES, "nothing but its noise");
-	/* Few unlike values, as a scale with two decimals gives at rest, and a contact that jumps: no answer to the load. */
+	/* Few unlike values, as a scale with two decimals gives at rest, and a contact that jumps: no answer to the load.
+	 */
 	table = good(SAMPLES);
 	for (size_t i = 0; i < SAMPLES; i++) {
 		values(table, "force_N")[i] = 5 + 0.01 * round(tactus_random_normal(3, 2, i));
