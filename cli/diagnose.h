@@ -45,7 +45,7 @@ const char *cli_column_unit(const char *column);
 const char *cli_verdict_words(enum tactus_verdict verdict);
 /* The base error that says most: the largest share of its noise floor; NULL where there is none. */
 const tactus_base_error *cli_worst_base(const tactus_diagnosed *series);
-/* Why the error in newtons grows; NULL where it does not. */
+/* Why the error in newtons does not fall; NULL where it does. */
 const char *cli_no_force_gain(const tactus_diagnosed *series);
 
 #endif

@@ -57,7 +57,7 @@ static void cards(const struct html *html, const tactus_diagnosed *series)
 	}
 	if (gain && isfinite(gain->force_rmse_after_N))
 		card(html, cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", 2, text),
-			 gain->no_force_gain ? "once extended: worse in force" : "off once extended");
+			 gain->no_force_gain ? "in force once extended: no gain" : "off once extended");
 	if (gain) {
 		card(html, cli_percent(gain->reduction, text),
 			 gain->no_force_gain ? "less error of the reading, unseen" : "less error on unseen data");

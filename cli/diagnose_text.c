@@ -66,6 +66,18 @@ static void effects_rival(struct words *words, const tactus_cause *cause, const 
 		words_add(words, "%s%s", i + 1 < cause->inseparable ? ", " : last, cause->rivals[i].effect);
 }
 
+/* Problems stand above this line: a reason that is one of them is not said again. */
+static void bad_reason(struct words *words, const tactus_diagnosis *diagnosis, const tactus_diagnosed *series)
+{
+	const char *text = series->summary ? series->summary : "";
+	for (size_t i = 0; i < diagnosis->problem_count; i++)
+		if (strstr(text, diagnosis->problems[i].text)) {
+			words_add(words, "the problem above leaves nothing to explain");
+			return;
+		}
+	words_add(words, "%s", text);
+}
+
 /* The first line: how far off, of what kind, why. */
 static void headline(const struct page *page, const tactus_diagnosed *series)
 {
@@ -95,7 +107,8 @@ static void headline(const struct page *page, const tactus_diagnosed *series)
 				  series->unexplained_count ? series->unexplained[0].covariate : "");
 		break;
 	case TACTUS_VERDICT_BAD_RECORDING:
-		words_add(&words, "Bad recording. %s", series->summary ? series->summary : "");
+		words_add(&words, "Bad recording: ");
+		bad_reason(&words, page->diagnosis, series);
 		break;
 	}
 	page_emphasis(page, colour_of(series->verdict));
@@ -110,7 +123,8 @@ static void say_measured(const struct page *page, const tactus_diagnosed *series
 	words_add(&words, "%s (%s", recordings_name(page->diagnosis, name), page->diagnosis->domain);
 	if (series->channel)
 		words_add(&words, ", channel %d", series->channel);
-	words_add(&words, ", %zu samples", series->samples);
+	if (series->samples)
+		words_add(&words, ", %zu samples", series->samples);
 	if (series->left_out)
 		words_add(&words, ", %zu left out", series->left_out);
 	words_add(&words, ")");
@@ -189,7 +203,7 @@ static void say_rivals(const struct page *page, const tactus_diagnosed *series)
 	page_item(page, cause->inseparable ? "Rivals" : "Considered", "%s.", words.text);
 }
 
-/* Better readings that are worse newtons are no gain: said apart, and why; channels of one reason together. */
+/* Better readings that are no better newtons: said apart, and why; channels of one reason together. */
 static void say_no_force_gain(const struct page *page)
 {
 	const tactus_diagnosis *d = page->diagnosis;
@@ -211,7 +225,7 @@ static void say_no_force_gain(const struct page *page)
 					  cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", 2, after));
 		}
 		if (why && !said)
-			page_item(page, "Beware", "in newtons the error grows on these (%s): %s.", words.text, why);
+			page_item(page, "Beware", "in newtons nothing is gained (%s): %s.", words.text, why);
 	}
 }
 
@@ -243,8 +257,8 @@ static void say_rest(const struct page *page, const tactus_diagnosed *series)
 	for (size_t i = 0; i < series->unexplained_count && i < CONSIDERED; i++) {
 		const tactus_dependence *left = &series->unexplained[i];
 		if (left->explained > 0)
-			page_item(page, i ? "" : "Left over", "%s (%s of what is left depends on %s).", left->text,
-					  cli_percent(left->explained, share), left->covariate);
+			page_item(page, i ? "" : "Left over", "%s; that is %s of what is left.", left->text,
+					  cli_percent(left->explained, share));
 		else /* its text says all of it */
 			page_item(page, i ? "" : "Left over", "%s.", left->text);
 	}
@@ -321,7 +335,8 @@ static void say_next(const struct page *page)
 		page_item(page, "Next", "%s%s", experiment->text, full_stop(experiment->text));
 		command_line(page, experiment->command);
 	} else if (verdict == TACTUS_VERDICT_BAD_RECORDING) {
-		page_item(page, "Next", "look at the recording: `tactus show` says what is in it.");
+		page_item(page, "Next",
+				  "mend what the problem is and record again; `tactus show` says what is in a recording.");
 	} else if (extends && !extended) {
 		again_with(page,
 				   worse_in_newtons(page->diagnosis)

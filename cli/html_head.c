@@ -37,7 +37,7 @@ static const char style[] =
 	"th,td{text-align:left;padding:.3rem .8rem .3rem 0;border-bottom:1px solid var(--line);vertical-align:top}\n"
 	"th{font-weight:600;color:var(--soft)}\n"
 	"td.number,th.number{font-variant-numeric:tabular-nums}\n"
-	"td.number{white-space:nowrap}\n"
+	"td.number,span.number{white-space:nowrap}td.covariate{overflow-wrap:anywhere;min-width:9rem}\n"
 	".figures>*{min-width:0}.inner table{min-width:0}a{color:var(--after)}\n"
 	"tr{break-inside:avoid}\n"
 	"tr.named td{font-weight:600}\n"
@@ -57,6 +57,7 @@ static const char style[] =
 	"repeat(4,1fr)}.cards strong{font-size:13pt}.figures{grid-template-columns:1fr 1fr;break-inside:auto;gap:.6rem "
 	"1.2rem}"
 	"details::details-content{content-visibility:visible;display:block}details h2{display:block}summary{display:none}"
+	"table{break-inside:avoid}.scroll{overflow:visible}"
 	"h2,h3,h4{break-after:avoid}pre,.cards li{print-color-adjust:exact}}\n";
 
 void html_head(const struct html *html, const char *title)

@@ -41,7 +41,7 @@ static const char *p_text(double p, char text[64])
 /* The column, and below it how the error depends on it: two columns of text would be too narrow on a phone. */
 static void covariate_cell(const struct html *html, const tactus_dependence *dependence)
 {
-	fputs("<td>", html->out);
+	fputs("<td class=\"covariate\">", html->out);
 	html_text(html, dependence->covariate);
 	fputs("<br><span class=\"soft\">", html->out);
 	html_text(html, dependence->text);
@@ -259,7 +259,7 @@ static void gain(const struct html *html, const tactus_diagnosed *series, size_t
 	fputs("</tr>\n", html->out);
 	html_table_end(html);
 	if (g->no_force_gain) {
-		fputs("<p class=\"warn\">In newtons the error grows on these: ", html->out);
+		fputs("<p class=\"warn\">In newtons nothing is gained: ", html->out);
 		html_text(html, g->no_force_gain);
 		fputs(".</p>\n", html->out);
 	}

@@ -25,9 +25,14 @@ static void widen(struct axis *axis, double value)
 static struct axis new_axis(const char *quantity, const char *unit, double size)
 {
 	struct axis axis = {.least = INFINITY, .most = -INFINITY};
-	char shown[32];
+	char shown[32], name[64];
+	int length = (int)strlen(quantity), most = 36; /* a longer label would leave the picture */
+	if (length > most)
+		for (length = most - 1; length > 0 && ((unsigned char)quantity[length] & 0xC0) == 0x80;)
+			length--;
+	snprintf(name, sizeof name, "%.*s%s", length, quantity, quantity[length] ? "…" : "");
 	axis.scale = pow(10, cli_si_prefix(size, unit, shown));
-	snprintf(axis.label, sizeof axis.label, *shown ? "%.90s (%s)" : "%.90s", quantity, shown);
+	snprintf(axis.label, sizeof axis.label, *shown ? "%s (%s)" : "%s", name, shown);
 	return axis;
 }
 

@@ -96,9 +96,9 @@ typedef struct {
 	double reduction, ci95[2];                      /**< 1 − after / before of that output, block bootstrap */
 	double of_explainable;                          /**< share of (before² − noise floor²) removed */
 	double force_rmse_before_N, force_rmse_after_N; /**< through the live inverse; NaN where no force is estimated */
-	const char *no_force_gain; /**< why the error in newtons grows all the same; NULL: it does not */
-	size_t blocks;             /**< how many were held out */
-	const char *held_out;      /**< what they are: "stretches", "recordings" */
+	const char *no_force_gain;                      /**< why the error in newtons does not fall; NULL: it does */
+	size_t blocks;                                  /**< how many were held out */
+	const char *held_out;                           /**< what they are: "stretches", "recordings" */
 } tactus_gain;
 
 typedef struct {

@@ -17,24 +17,37 @@ namespace
 
 /* L and H are the lowest and highest load of the recording, M half of H, X three times H; %g takes newtons. */
 struct Item {
-	const char *steps; /* letters in braces are loads */
-	double rate_Hz;    /* at least */
-	const char *what;
+	const char *steps;                    /* letters in braces are loads */
+	double rate_Hz;                       /* at least */
+	const char *what, *because, *between; /* the reason, and the effects that it is one for */
 };
 
 const Item menu[] = {
-	{"repeat 3 (rest 40s, hold {H} 60s), rest 120s", 10,
-	 "a load, a rest and the load again: what recovers is no drift"},
-	{"repeat 10 (tap {H} 200ms, rest 1s)", 500, "taps, sampled fast: a late reading keeps their shape, a lag does not"},
+	{"repeat 3 (rest 40s, hold {H} 60s), rest 120s", 10, "a load, a rest and the load again",
+	 "what recovers is no drift", "creep drift step-change temperature"},
+	{"repeat 10 (tap {H} 200ms, rest 1s)", 500, "taps, sampled fast",
+	 "a late reading keeps their shape, a lag does not", "lag time-offset"},
 	{"sine 0.2Hz {L}..{H} 40s, sine 2Hz {L}..{H} 10s, sine 0.2Hz {L}..{M} 40s, sine 2Hz {L}..{M} 10s", 50,
-	 "two rates and two amplitudes: friction knows no rate, a lag no amplitude"},
-	{"cycle 0.5Hz {L}..{H} 120s, hold {H} 120s, cycle 0.5Hz {L}..{H} 120s, rest 60s", 10,
-	 "cycling against holding: only the one wears"},
-	{"cycle 0.5Hz {L}..{H} 900s", 5, "cycling for long: an exponential ends, a line does not"},
-	{"staircase 0N..{X}..0N {M} 4s", 10, "loads far past those of this recording: an asymptote shows, a power goes on"},
-	{"ramp 0N..{H} 20s, ramp {H}..0N 20s, staircase 0N..{M}..0N {S} 2s", 20, "small loads as well as large ones"},
-	{"random 0N..{H} 2s 120s", 20, "loads in no order: nothing then goes with time"},
+	 "two rates and two amplitudes", "friction knows no rate, a lag no amplitude", "hysteresis lag time-offset"},
+	{"cycle 0.5Hz {L}..{H} 120s, hold {H} 120s, cycle 0.5Hz {L}..{H} 120s, rest 60s", 10, "cycling against holding",
+	 "only the one wears", "cyclic-decline linear-decline creep drift"},
+	{"cycle 0.5Hz {L}..{H} 900s", 5, "cycling for long", "an exponential ends, a line does not",
+	 "cyclic-decline linear-decline"},
+	{"staircase 0N..{X}..0N {M} 4s", 10, "loads far past those of this recording",
+	 "an asymptote shows, a power goes on", "saturation nonlinearity"},
+	{"ramp 0N..{H} 20s, ramp {H}..0N 20s, staircase 0N..{M}..0N {S} 2s", 20, "small loads as well as large ones", "",
+	 ""},
+	{"random 0N..{H} 2s 120s", 20, "loads in no order, so that nothing goes with time", "", ""},
 };
+
+/* In words; the reason only where it is one for this pair. */
+std::string words_of(const Item &item, const std::string &a, const std::string &b)
+{
+	const std::string between = std::string(" ") + item.between + " ";
+	const bool apt =
+		between.find(" " + a + " ") != std::string::npos && between.find(" " + b + " ") != std::string::npos;
+	return std::string(item.what) + (apt ? std::string(": ") + item.because : "");
+}
 
 std::string steps_of(const Item &item, double low, double high)
 {
@@ -229,7 +242,7 @@ std::string by_covariate(const Work &work, const char *device, const tactus_effe
 {
 	const std::string covariate = effect ? effect->covariate : "";
 	const double high = tactus_series_maximum(work.problem->segments.front(), int(work.problem->input_signal()));
-	const std::string loads = steps_of({"repeat 2 (ramp 0N..{H} 20s, ramp {H}..0N 20s)", 10, ""}, 0, high);
+	const std::string loads = steps_of({"repeat 2 (ramp 0N..{H} 20s, ramp {H}..0N 20s)", 10, "", "", ""}, 0, high);
 	if (!work.problem->domain->loaded)
 		return scan_command(work, device, "--loads standard --mode dc,ac");
 	std::string command =
@@ -266,8 +279,8 @@ const tactus_experiment *to_test_more(Store &store, const Work &work, const char
 	std::string text = "this recording could not test ";
 	for (size_t i = 0; i < names.size(); i++)
 		text += (i ? ", " : "") + names[i];
-	return made(store, names, command_of(work, device, choice.steps, choice.rate_Hz), text + "; " + choice.item->what,
-				NAN);
+	return made(store, names, command_of(work, device, choice.steps, choice.rate_Hz),
+				text + "; this one can: " + choice.item->what, NAN);
 }
 
 } // namespace
@@ -296,7 +309,7 @@ const tactus_experiment *propose(Store &store, const Work &work, const char *dev
 			snprintf(expected, sizeof expected, "; expected evidence between %s and %s: ΔBIC −%.0f", names[0].c_str(),
 					 first->name.c_str(), choice.evidence);
 			return made(store, names, command_of(work, device, choice.steps, choice.rate_Hz),
-						std::string(choice.item->what) + expected, choice.evidence);
+						words_of(*choice.item, names[0], first->name) + expected, choice.evidence);
 		}
 	}
 	if (first)

@@ -200,15 +200,19 @@ double load_moves(const Problem &problem)
 	return count > 0 ? std::sqrt(std::fmax(within, 0) / count) : 0;
 }
 
-/* Why newtons get worse while readings are simulated better; NULL where they do not. */
-const char *no_force_gain(const Problem &problem, const ForceErrors &before, const ForceErrors &after)
+/* Why newtons gain nothing while readings are simulated better; NULL where they do. */
+const char *no_force_gain(const Problem &problem, const VectorXd &left, const VectorXd &before,
+						  const ForceErrors &force_left, const ForceErrors &force_before)
 {
-	if (!(after.rmse > 1.02 * before.rmse))
+	if (!(force_left.rmse > 0.98 * force_before.rmse))
 		return nullptr;
 	if (load_moves(problem) < 0.02)
 		return "the load hardly moves there, so nothing tells a change of sensitivity from one of offset; record loads "
 			   "that rise and fall";
-	if (after.quick > 0.7 * after.rmse)
+	for (size_t o = 0; o < problem.output_count; o++)
+		if (problem.outputs[o] && rmse(blocks_of(problem, o, left)) > 0.9 * rmse(blocks_of(problem, o, before)))
+			return "a force is estimated from both readings, and the other one is as far off as before";
+	if (force_left.quick > 0.7 * force_left.rmse)
 		return "the extended model answers less to the load, and its inverse amplifies the noise of the readings";
 	return "read backwards, sample by sample, the model goes by its own earlier estimates and cannot know what is "
 		   "still "
@@ -248,7 +252,7 @@ const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, s
 	const ForceErrors force_before = force_errors(work, old), force_after = force_errors(work, next);
 	gain.force_rmse_before_N = force_before.rmse;
 	gain.force_rmse_after_N = force_after.rmse;
-	gain.no_force_gain = no_force_gain(problem, force_before, force_after);
+	gain.no_force_gain = no_force_gain(problem, after, before, force_after, force_before);
 	gain.blocks = size_t(std::count_if(b.count.begin(), b.count.end(), [](double c) { return c > 0; }));
 	gain.held_out = problem.whole_recordings ? "recordings" : "stretches";
 	for (const Cause &cause : d.causes) {

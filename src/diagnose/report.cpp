@@ -368,7 +368,7 @@ std::string summary_of(const tactus_diagnosed &s)
 		gain = buffer;
 		if (std::isfinite(s.gain->force_rmse_before_N)) {
 			snprintf(buffer, sizeof buffer,
-					 s.gain->no_force_gain ? ", but grows in newtons (%.3g N to %.3g N)" : " (%.3g N to %.3g N)",
+					 s.gain->no_force_gain ? ", but not in newtons (%.3g N to %.3g N)" : " (%.3g N to %.3g N)",
 					 s.gain->force_rmse_before_N, s.gain->force_rmse_after_N);
 			gain += buffer;
 		}

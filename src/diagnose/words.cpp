@@ -47,14 +47,15 @@ std::string quantity(double value, const std::string &unit)
 	char text[64];
 	const double size = std::abs(value);
 	int power = size > 0 && std::isfinite(size) ? int(std::floor(std::log10(size) / 3)) : 0;
-	static const char *const plain[] = {"", "1", "degC", "pct", "um", "mm", "mV"};
-	const bool bare = std::any_of(std::begin(plain), std::end(plain), [&](const char *p) { return unit == p; }) ||
-					  unit.find('/') != std::string::npos;
-	if (bare || power < -5 || power > 3 || unit.size() > 4)
-		snprintf(text, sizeof text, "%.3g%s%s", value, unit.empty() || unit == "1" ? "" : " ",
+	static const char *const prefixed[] = {"S", "F", "V", "A", "ohm", "Hz", "s", "N", "Nm", "m", "rad", "Pa"};
+	const bool known = std::any_of(std::begin(prefixed), std::end(prefixed), [&](const char *p) { return unit == p; });
+	const char *sign = value < 0 ? "−" : "";
+	if (!known || power < -5 || power > 3)
+		snprintf(text, sizeof text, "%s%.3g%s%.40s", sign, size, unit.empty() || unit == "1" ? "" : " ",
 				 unit == "1" ? "" : unit.c_str());
 	else
-		snprintf(text, sizeof text, "%.3g %s%s", value / std::pow(10, 3 * power), prefixes[power + 5], unit.c_str());
+		snprintf(text, sizeof text, "%s%.3g %s%s", sign, size / std::pow(10, 3 * power), prefixes[power + 5],
+				 unit.c_str());
 	return text;
 }
 
@@ -83,7 +84,9 @@ Bins bins_of(const Problem &problem, size_t output, const VectorXd &values, cons
 			x += pairs[i].first;
 			r += pairs[i].second;
 		}
-		bins.at.push_back(x / double(to - from));
+		x /= double(to - from);
+		const double span = pairs.back().first - pairs.front().first;
+		bins.at.push_back(std::abs(x) < 1e-3 * span ? 0 : x); /* "around 0 N", not some micronewtons of noise */
 		bins.mean.push_back(r / double(to - from));
 	}
 	return bins;

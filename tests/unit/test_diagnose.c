@@ -109,6 +109,34 @@ static void creep_is_named_and_its_gain_is_what_it_does(void **unused)
 	tactus_table_free(table);
 }
 
+/* Readings of one kind come at 5 Hz, between them those of the other, 13 ms later: the spectrum ends at 2.5 Hz. */
+static void a_spectrum_has_the_clock_of_its_output(void **unused)
+{
+	(void)unused;
+	tactus_table *single = recording(0.08, 1, 4), *table = tactus_table_new();
+	const char *names[] = {"time_s", "force_N", "conductance_S", "capacitance_F"};
+	assert_int_equal(tactus_table_resize(table, N), 0);
+	for (size_t k = 0; k < 4; k++)
+		tactus_table_set_numbers(table, names[k]);
+	double *column[4];
+	for (size_t k = 0; k < 4; k++)
+		column[k] = tactus_table_set_numbers(table, names[k]);
+	for (size_t i = 0; i < N; i++) {
+		double g = tactus_table_numbers(single, "conductance_S")[i];
+		column[0][i] = 0.2 * (double)(i / 2) + 0.013 * (double)(i % 2);
+		column[1][i] = tactus_table_numbers(single, "force_N")[i];
+		column[2][i] = i % 2 ? NAN : g;
+		column[3][i] = i % 2 ? 1e-6 * g : NAN;
+	}
+	const tactus_diagnosis *d = diagnosed(table, NULL);
+	const tactus_before_after *spectrum = &d->series[0].spectrum, *lags = &d->series[0].autocorrelation;
+	assert_true(spectrum->n > 2 && fabs(spectrum->x[spectrum->n - 1] - 2.5) < 1e-6);
+	assert_true(lags->n > 2 && fabs(lags->x[1] - 0.2) < 1e-9);
+	tactus_diagnosis_free(d);
+	tactus_table_free(table);
+	tactus_table_free(single);
+}
+
 /* A step that is small beside the cause before it, but all that is left of the misfit. */
 static void a_step_beside_a_large_cause_is_named(void **unused)
 {
@@ -216,6 +244,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(nothing_hidden_is_nothing_wrong),
 		cmocka_unit_test(creep_is_named_and_its_gain_is_what_it_does),
+		cmocka_unit_test(a_spectrum_has_the_clock_of_its_output),
 		cmocka_unit_test(a_step_beside_a_large_cause_is_named),
 		cmocka_unit_test(a_coarse_converter_is_named_through_noise),
 		cmocka_unit_test(moved_sensitivity_is_a_stale_calibration),
