@@ -158,11 +158,33 @@ std::string scan_command(const Work &work, const char *device, const std::string
 	return command + " " + rest + " -o next.csv";
 }
 
+/* As it was recorded: in one mode, where the recording says that it was one. */
+std::string modes_of(const Work &work)
+{
+	const char *modes = work.evidence.metadata ? tactus_metadata_get(work.evidence.metadata, "modes") : nullptr;
+	return modes && (strcmp(modes, "dc") == 0 || strcmp(modes, "ac") == 0) ? std::string("--mode ") + modes + " " : "";
+}
+
 std::string command_of(const Work &work, const char *device, const std::string &steps, double rate_Hz)
 {
 	char rate[48];
 	snprintf(rate, sizeof rate, "--rate %gHz", rate_Hz);
-	return scan_command(work, device, "--protocol \"" + steps + "\" " + rate);
+	return scan_command(work, device, modes_of(work) + "--protocol \"" + steps + "\" " + rate);
+}
+
+/* A scan refuses a rate that leaves its readings no time to settle; the recording says how long its own took. */
+double possible_Hz(const Work &work, double wanted_Hz)
+{
+	double settle_s, own_Hz;
+	const tactus_metadata *m = work.evidence.metadata;
+	if (!m || tactus_metadata_get_number(m, "settle_s", &settle_s) != 1)
+		return wanted_Hz;
+	const double reading_s = settle_s + 2e-3, /* and some for the reading itself */
+		modes = modes_of(work).empty() ? 2 : 1;
+	double most_Hz = std::floor(1 / (modes * reading_s));
+	if (tactus_metadata_get_number(m, "rate_requested_Hz", &own_Hz) == 1)
+		most_Hz = std::fmax(most_Hz, own_Hz);
+	return std::fmin(wanted_Hz, most_Hz);
 }
 
 struct Choice {
@@ -185,7 +207,7 @@ class Menu
 		Choice choice;
 		for (const Item &item : menu) {
 			const std::string steps = steps_of(item, low, high);
-			double rate = item.rate_Hz;
+			const double rate = possible_Hz(work, item.rate_Hz);
 			Synthetic synthetic(series, steps, rate);
 			if (synthetic.series.n < 2)
 				continue;

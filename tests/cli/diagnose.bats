@@ -307,9 +307,21 @@ survives() {
 	tactus scan sim:creep.toml --protocol "rest 2s, hold 150N 200s" --channels 1 --mode dc -q -o once.csv
 	tactus diagnose once.csv --device sim:creep.toml --json >once.json
 	jq -e '.verdict == "ambiguous" and ([.series[0].causes[0] | .effect, .rivals[].effect] | index("creep") != null)' once.json
-	eval "$(jq -r '.series[0].next_experiment.command' once.json) --mode dc -q"
+	eval "$(jq -r '.series[0].next_experiment.command' once.json) -q"
 	tactus diagnose next.csv --json >next.json
 	jq -e '.verdict == "cause-found" and [.series[0].causes[].effect] == ["creep"]' next.json
+}
+
+@test "what is proposed is within what the scan can do: taps at no more readings a second than have time to settle" {
+	for mode in dc dc,ac; do
+		tactus scan "sim:$BATS_FILE_TMPDIR/creep.toml" --protocol "rest 5s, hold 150N 60s" --channels 1 --mode $mode -q --overwrite -o short.csv
+		tactus diagnose short.csv --device "sim:$BATS_FILE_TMPDIR/creep.toml" --json >short.json
+		jq -e '.series[0].next_experiment' short.json || continue # told apart at once
+		command=$(jq -r '.series[0].next_experiment.command' short.json)
+		rm -f next.csv
+		eval "$command -q"
+		[ -s next.csv ]
+	done
 }
 
 @test "a second cause that shows in the weaker output only is not hidden by the first" {
