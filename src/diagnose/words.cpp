@@ -77,17 +77,26 @@ Bins bins_of(const Problem &problem, size_t output, const VectorXd &values, cons
 	std::sort(pairs.begin(), pairs.end());
 	Bins bins;
 	const size_t count = std::min<size_t>(8, pairs.size());
+	const double span = pairs.empty() ? 0 : pairs.back().first - pairs.front().first;
+	double weight = 0;
 	for (size_t k = 0; k < count; k++) {
 		const size_t from = k * pairs.size() / count, to = (k + 1) * pairs.size() / count;
+		const double n = double(to - from);
 		double x = 0, r = 0;
 		for (size_t i = from; i < to; i++) {
-			x += pairs[i].first;
-			r += pairs[i].second;
+			x += pairs[i].first / n;
+			r += pairs[i].second / n;
 		}
-		x /= double(to - from);
-		const double span = pairs.back().first - pairs.front().first;
-		bins.at.push_back(std::abs(x) < 1e-3 * span ? 0 : x); /* "around 0 N", not some micronewtons of noise */
-		bins.mean.push_back(r / double(to - from));
+		if (std::abs(x) < 1e-3 * span)
+			x = 0; /* "around 0 N", not some micronewtons of noise */
+		if (bins.at.empty() || std::abs(x - bins.at.back()) > 1e-3 * span) {
+			bins.at.push_back(x);
+			bins.mean.push_back(r);
+			weight = n;
+			continue;
+		}
+		weight += n; /* one place: a load that was held */
+		bins.mean.back() += (r - bins.mean.back()) * n / weight;
 	}
 	return bins;
 }
@@ -145,7 +154,7 @@ const tactus_dependence *describe(Store &store, const Work &work, const std::vec
 			text = store.format("%s differs between rising and falling %s", what, on);
 		} else if (group.aspect == "sensitivity") {
 			text = store.format("the sensitivity of %s changes with %s", what, on);
-		} else if (shown.mean.empty()) {
+		} else if (shown.mean.size() < 2) {
 			text = store.format("%s depends on %s", what, on);
 		} else {
 			const auto [low, high] = std::minmax_element(shown.mean.begin(), shown.mean.end());
