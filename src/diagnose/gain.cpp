@@ -214,9 +214,8 @@ const char *no_force_gain(const Problem &problem, const VectorXd &left, const Ve
 			return "a force is estimated from both readings, and the other one is as far off as before";
 	if (force_left.quick > 0.7 * force_left.rmse)
 		return "the extended model answers less to the load, and its inverse amplifies the noise of the readings";
-	return "read backwards, sample by sample, the model goes by its own earlier estimates and cannot know what is "
-		   "still "
-		   "to come";
+	return "read backwards, sample by sample, the model goes by its own earlier estimates and does not know what will "
+		   "come";
 }
 
 } // namespace
