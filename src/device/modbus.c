@@ -18,7 +18,7 @@
 #include "core/core.h"
 #include "device/live.h"
 #include "device/modbus.h"
-#include "device/serial_port.h"
+#include "device/port.h"
 
 enum {
 	SILENT_MAX = 5,     /* attempts in a row without any answer: the link is lost */
@@ -33,7 +33,7 @@ enum {
 struct tactus_modbus {
 	tactus_modbus_options options;
 	char *name;
-	tactus_serial_identity identity; /* of the adapter */
+	tactus_port_identity identity; /* of the adapter */
 	modbus_t *context;               /* NULL while it is lost */
 	tactus_faults *faults;
 	double timeout_s, silence_s;
@@ -145,7 +145,7 @@ int tactus_modbus_open(const tactus_modbus_options *options, tactus_faults *faul
 												   ipv6 ? "]" : "", options->port);
 	int code = link->name != NULL ? connect_link(link) : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	if (code >= 0 && options->serial) {
-		tactus_serial_identify(options->path, &link->identity);
+		tactus_port_identify(options->path, &link->identity);
 		tactus_modbus_distrust(link); /* whatever came before it was opened */
 	}
 	if (code < 0) {
@@ -169,7 +169,7 @@ void tactus_modbus_close(tactus_modbus *link)
 int tactus_modbus_reopen(tactus_modbus *link)
 {
 	disconnect(link);
-	if (link->options.serial && !tactus_serial_find(&link->identity, link->options.path, sizeof(link->options.path)))
+	if (link->options.serial && !tactus_port_find(&link->identity, link->options.path, sizeof(link->options.path)))
 		return tactus_fail(TACTUS_ERR_DEVICE, "the adapter of %s is not there", link->name);
 	link->doubtful = link->options.serial; /* of the same request as before it was lost, if of any */
 	return connect_link(link);

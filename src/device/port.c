@@ -1,4 +1,8 @@
-/* Serial ports through libserialport; terminals that it does not know (ptys, as tests and emulators have) directly. */
+/*
+ * Serial ports: what is plugged in behind a name, as /sys/class/tty has it; opened through libserialport, terminals
+ * that it does not know (ptys, as tests and emulators have) directly.
+ */
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <libserialport.h>
@@ -11,6 +15,90 @@
 
 #include "core/core.h"
 #include "device/port.h"
+
+/* ---- which adapter it is ---- */
+
+/* The first line of a file in a folder of /sys; "" if there is none. */
+static void read_attribute(const char *folder, const char *name, char *text, size_t size)
+{
+	char path[PATH_MAX + 64];
+	snprintf(path, sizeof(path), "%s/%s", folder, name);
+	text[0] = '\0';
+	FILE *file = fopen(path, "re");
+	if (file == NULL)
+		return;
+	if (fgets(text, (int)size, file) == NULL)
+		text[0] = '\0';
+	text[strcspn(text, "\n")] = '\0';
+	fclose(file);
+}
+
+/* From the folder of the port upwards: first the interface, then the USB device. */
+static void climb(char *folder, tactus_port_identity *identity)
+{
+	for (char *slash = strrchr(folder, '/'); slash != NULL && slash != folder; slash = strrchr(folder, '/')) {
+		if (identity->interface[0] == '\0')
+			read_attribute(folder, "bInterfaceNumber", identity->interface, sizeof(identity->interface));
+		read_attribute(folder, "idVendor", identity->vendor, sizeof(identity->vendor));
+		if (identity->vendor[0] != '\0') {
+			read_attribute(folder, "idProduct", identity->product, sizeof(identity->product));
+			read_attribute(folder, "serial", identity->serial, sizeof(identity->serial));
+			snprintf(identity->socket, sizeof(identity->socket), "%.63s", slash + 1);
+			return;
+		}
+		*slash = '\0';
+	}
+	identity->interface[0] = '\0'; /* not of a USB device */
+}
+
+static void look_up(const char *port, tactus_port_identity *identity)
+{
+	char link[PATH_MAX], folder[PATH_MAX];
+	snprintf(link, sizeof(link), "/sys/class/tty/%.200s", port);
+	if (realpath(link, folder) != NULL)
+		climb(folder, identity);
+}
+
+void tactus_port_identify(const char *path, tactus_port_identity *identity)
+{
+	char real[PATH_MAX];
+	memset(identity, 0, sizeof(*identity));
+	snprintf(identity->path, sizeof(identity->path), "%s", path);
+	/* a port's own name, or a link to it, as those in /dev/serial/by-id are */
+	const char *whole = strncmp(path, "/dev/tty", 8) == 0 ? path : realpath(path, real);
+	const char *port = whole != NULL ? strrchr(whole, '/') : NULL;
+	if (port != NULL)
+		look_up(port + 1, identity);
+}
+
+static bool same(const tactus_port_identity *a, const tactus_port_identity *b)
+{
+	return strcmp(a->vendor, b->vendor) == 0 && strcmp(a->product, b->product) == 0 &&
+		   strcmp(a->serial, b->serial) == 0 && strcmp(a->interface, b->interface) == 0 &&
+		   (a->serial[0] != '\0' || strcmp(a->socket, b->socket) == 0);
+}
+
+bool tactus_port_find(const tactus_port_identity *identity, char *path, size_t size)
+{
+	bool found = false;
+	if (identity->vendor[0] == '\0') {
+		snprintf(path, size, "%s", identity->path);
+		return access(path, F_OK) == 0;
+	}
+	DIR *folder = opendir("/sys/class/tty");
+	if (folder == NULL)
+		return false;
+	for (struct dirent *entry = readdir(folder); entry != NULL && !found; entry = readdir(folder)) {
+		tactus_port_identity other;
+		memset(&other, 0, sizeof(other));
+		look_up(entry->d_name, &other);
+		found = other.vendor[0] != '\0' && same(identity, &other);
+		if (found)
+			snprintf(path, size, "/dev/%s", entry->d_name);
+	}
+	closedir(folder);
+	return found;
+}
 
 /* ---- opening ---- */
 
@@ -59,13 +147,13 @@ static int open_known(struct sp_port *known, const char *name, int baud)
 	return fd < 0 ? fail_open(name) : fd;
 }
 
-int tactus_port_open(const char *name, int baud, tactus_serial_identity *identity)
+int tactus_port_open(const char *name, int baud, tactus_port_identity *identity)
 {
 	struct sp_port *known = NULL;
 	char *real = realpath(name, NULL); /* /dev/serial/by-id/… is a link */
 	if (real == NULL)
 		return fail_open(name);
-	tactus_serial_identify(name, identity);
+	tactus_port_identify(name, identity);
 	if (sp_get_port_by_name(real, &known) == SP_OK) {
 		const int fd = open_known(known, name, baud);
 		sp_free_port(known);
@@ -82,19 +170,19 @@ int tactus_port_open(const char *name, int baud, tactus_serial_identity *identit
 	return code;
 }
 
-/* ---- finding ---- */
-
-int tactus_port_reopen(const tactus_serial_identity *identity, int baud)
+int tactus_port_reopen(const tactus_port_identity *identity, int baud)
 {
 	char path[PATH_MAX];
-	tactus_serial_identity again;
-	if (!tactus_serial_find(identity, path, sizeof(path)))
+	tactus_port_identity again;
+	if (!tactus_port_find(identity, path, sizeof(path)))
 		return tactus_fail(TACTUS_ERR_LOST, "%s: not plugged in", identity->path);
 	const int fd = tactus_port_open(path, baud, &again);
 	return fd < 0 ? tactus_fail(TACTUS_ERR_LOST, "%s", tactus_error_message()) : fd;
 }
 
-void tactus_port_describe(const tactus_serial_identity *identity, char *text, size_t size)
+/* ---- saying ---- */
+
+void tactus_port_describe(const tactus_port_identity *identity, char *text, size_t size)
 {
 	const bool usb = identity->vendor[0] != '\0', numbered = identity->serial[0] != '\0';
 	if (usb)

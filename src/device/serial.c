@@ -45,7 +45,7 @@ static const struct {
 enum { NOWHERE = -1, SEQUENCE = -2 };
 
 typedef struct {
-	tactus_serial_identity port;
+	tactus_port_identity port;
 	int fd, baud;
 	double timeout_s; /* of the URI or the profile; NaN: none */
 	double silence_s; /* of the running scan */

@@ -1,7 +1,7 @@
 /* Serial adapters are known by what they are, not by their names: against a /sys of our own. */
 #include <umockdev.h>
 
-#include "device/serial_port.h"
+#include "device/port.h"
 #include "device_rig.h"
 
 typedef struct {
@@ -41,24 +41,24 @@ static void unplug(UMockdevTestbed *bed, const adapter *a)
 static void look(const adapter *known, const adapter *others, size_t n, const char *where)
 {
 	UMockdevTestbed *bed = umockdev_testbed_new();
-	tactus_serial_identity identity;
+	tactus_port_identity identity;
 	char name[64], found[64] = "";
 	plug(bed, known);
 	snprintf(name, sizeof(name), "/dev/%s", known->name);
-	tactus_serial_identify(name, &identity);
+	tactus_port_identify(name, &identity);
 	assert_string_equal(identity.vendor, "0403");
 	assert_string_equal(identity.serial, known->serial);
 	assert_string_equal(identity.socket, known->socket);
-	assert_true(tactus_serial_find(&identity, found, sizeof(found)));
+	assert_true(tactus_port_find(&identity, found, sizeof(found)));
 	assert_string_equal(found, name);
 	unplug(bed, known);
-	assert_false(tactus_serial_find(&identity, found, sizeof(found)));
+	assert_false(tactus_port_find(&identity, found, sizeof(found)));
 	for (size_t i = 0; i < n; i++)
 		plug(bed, &others[i]);
 	if (where == NULL)
-		assert_false(tactus_serial_find(&identity, found, sizeof(found)));
+		assert_false(tactus_port_find(&identity, found, sizeof(found)));
 	else {
-		assert_true(tactus_serial_find(&identity, found, sizeof(found)));
+		assert_true(tactus_port_find(&identity, found, sizeof(found)));
 		assert_string_equal(found, where);
 	}
 	g_object_unref(bed);
