@@ -6,7 +6,7 @@
 static bool print_line(void *context, const char *uri, const char *description)
 {
 	(void)context;
-	return printf("%-16s %s\n", uri, description) >= 0;
+	return printf("%-24s %s\n", uri, description) >= 0;
 }
 
 static bool print_json(void *context, const char *uri, const char *description)

@@ -18,6 +18,7 @@
 #include "core/core.h"
 #include "device/live.h"
 #include "device/modbus.h"
+#include "device/permission.h"
 #include "device/port.h"
 
 enum {
@@ -34,7 +35,7 @@ struct tactus_modbus {
 	tactus_modbus_options options;
 	char *name;
 	tactus_port_identity identity; /* of the adapter */
-	modbus_t *context;               /* NULL while it is lost */
+	modbus_t *context;             /* NULL while it is lost */
 	tactus_faults *faults;
 	double timeout_s, silence_s;
 	int64_t quiet_ns; /* nothing is sent on a serial line before */
@@ -85,10 +86,7 @@ static int fail_connect(const tactus_modbus *link, int error)
 	if (error == EINTR)
 		return tactus_fail(TACTUS_ERR_INTERRUPTED, "interrupted while connecting to %s", link->name);
 	if (error == EACCES && link->options.serial)
-		return tactus_fail(TACTUS_ERR_PERMISSION,
-						   "%s may not be opened: serial ports belong to a group, often dialout or uucp, of which you "
-						   "are no member (ls -l shows it)",
-						   link->options.path);
+		return tactus_fail_port_permission(link->options.path);
 	if (link->options.serial)
 		return tactus_fail(TACTUS_ERR_DEVICE, "%s: %s", link->options.path, strerror(error));
 	return tactus_fail(TACTUS_ERR_DEVICE, "cannot connect to %s: %s", link->name,

@@ -1,8 +1,10 @@
-/* Device nodes that may not be opened: finds the udev rules that were installed with the library. */
+/* Device nodes that may not be opened: the udev rules that were installed with the library, or the group of a port. */
 #include <dlfcn.h>
+#include <grp.h>
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/core.h"
@@ -44,4 +46,27 @@ int tactus_fail_permission(const char *node)
 {
 	char remedy[TACTUS_PERMISSION_SIZE];
 	return tactus_fail(TACTUS_ERR_PERMISSION, "no permission to open %s; %s", node, tactus_permission_remedy(remedy));
+}
+
+const char *tactus_permission_port_remedy(const char *node, char *text)
+{
+	struct stat facts;
+	struct group group, *found = NULL;
+	char buffer[4096];
+	if (stat(node, &facts) == 0 && (facts.st_mode & (S_IRGRP | S_IWGRP)) == (S_IRGRP | S_IWGRP))
+		(void)getgrgid_r(facts.st_gid, &group, buffer, sizeof(buffer), &found);
+	if (found != NULL)
+		snprintf(text, TACTUS_PERMISSION_SIZE,
+				 "it belongs to the group %.100s: sudo usermod -aG %.100s $USER, then log in again", found->gr_name,
+				 found->gr_name);
+	else
+		snprintf(text, TACTUS_PERMISSION_SIZE, "no group of users may open it; a udev rule or root can change that");
+	return text;
+}
+
+int tactus_fail_port_permission(const char *node)
+{
+	char remedy[TACTUS_PERMISSION_SIZE];
+	return tactus_fail(TACTUS_ERR_PERMISSION, "no permission to open %s; %s", node,
+					   tactus_permission_port_remedy(node, remedy));
 }

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "core/core.h"
+#include "device/permission.h"
 #include "device/port.h"
 
 /* ---- which adapter it is ---- */
@@ -105,10 +106,7 @@ bool tactus_port_find(const tactus_port_identity *identity, char *path, size_t s
 static int fail_open(const char *name)
 {
 	if (errno == EACCES || errno == EPERM)
-		return tactus_fail(TACTUS_ERR_PERMISSION,
-						   "%s: no permission; serial ports belong to the group dialout: `sudo usermod -aG dialout "
-						   "$USER`, then log in again",
-						   name);
+		return tactus_fail_port_permission(name);
 	if (errno == EBUSY)
 		return tactus_fail(TACTUS_ERR_DEVICE, "%s: another program has it open", name);
 	return tactus_fail(TACTUS_ERR_DEVICE, "%s: %s", name, strerror(errno));
@@ -192,6 +190,37 @@ void tactus_port_describe(const tactus_port_identity *identity, char *text, size
 		snprintf(text, size, "%s", identity->path);
 }
 
+/*
+ * Whether there is hardware behind it. The kernel makes ports of the computer's own in advance, and those without a
+ * chip have the type 0 (PORT_UNKNOWN); libserialport knows them by a driver's name that newer kernels do not use any
+ * more.
+ */
+static bool is_there(const char *name)
+{
+	char folder[PATH_MAX], type[8];
+	snprintf(folder, sizeof(folder), "/sys/class/tty/%.200s",
+			 strrchr(name, '/') != NULL ? strrchr(name, '/') + 1 : name);
+	read_attribute(folder, "type", type, sizeof(type));
+	return strcmp(type, "0") != 0;
+}
+
+/* "USB Serial, usb 2341:0043, serial 7573", and the remedy where it may not be opened. */
+static void introduce(struct sp_port *port, char *text, size_t size)
+{
+	const char *name = sp_get_port_name(port);
+	const char *product = sp_get_port_transport(port) == SP_TRANSPORT_USB ? sp_get_port_description(port) : NULL;
+	char remedy[TACTUS_PERMISSION_SIZE];
+	tactus_port_identity identity;
+	tactus_port_identify(name, &identity);
+	int n = snprintf(text, size, "%.100s", product != NULL ? product : "serial port");
+	if (identity.vendor[0] != '\0')
+		n += snprintf(text + n, size - (size_t)n, ", usb %s:%s", identity.vendor, identity.product);
+	if (identity.serial[0] != '\0')
+		n += snprintf(text + n, size - (size_t)n, ", serial %s", identity.serial);
+	if (access(name, R_OK | W_OK) < 0 && errno == EACCES)
+		snprintf(text + n, size - (size_t)n, "; no permission: %s", tactus_permission_port_remedy(name, remedy));
+}
+
 bool tactus_port_list(bool (*found)(void *context, const char *name, const char *description), void *context)
 {
 	struct sp_port **all = NULL;
@@ -199,8 +228,11 @@ bool tactus_port_list(bool (*found)(void *context, const char *name, const char 
 	if (sp_list_ports(&all) != SP_OK)
 		return true;
 	for (size_t i = 0; all[i] != NULL && more; i++) {
-		const char *description = sp_get_port_description(all[i]);
-		more = found(context, sp_get_port_name(all[i]), description != NULL ? description : "serial port");
+		char text[TACTUS_PERMISSION_SIZE + 300];
+		if (!is_there(sp_get_port_name(all[i])))
+			continue;
+		introduce(all[i], text, sizeof(text));
+		more = found(context, sp_get_port_name(all[i]), text);
 	}
 	sp_free_port_list(all);
 	return more;

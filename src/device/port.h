@@ -29,7 +29,8 @@ int tactus_port_open(const char *name, int baud, tactus_port_identity *identity)
 int tactus_port_reopen(const tactus_port_identity *identity, int baud);
 /* "/dev/ttyACM0 (usb 2341:0043 SERIAL)", or the name alone: what a recording says. */
 void tactus_port_describe(const tactus_port_identity *identity, char *text, size_t size);
-/* Calls found for every serial port that is there. False if found returned false. */
+/* Calls found for every serial port with hardware behind it; one that may not be opened is described with the remedy.
+ * False if found returned false. */
 bool tactus_port_list(bool (*found)(void *context, const char *name, const char *description), void *context);
 
 #endif

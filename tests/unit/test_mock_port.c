@@ -1,6 +1,9 @@
 /* Serial adapters are known by what they are, not by their names: against a /sys of our own. */
+#include <sys/stat.h>
 #include <umockdev.h>
+#include <unistd.h>
 
+#include "device/permission.h"
 #include "device/port.h"
 #include "device_rig.h"
 
@@ -90,12 +93,65 @@ static void test_one_with_several_ports_is_known_by_its_interface(void **state)
 	look(&known, others, 1, NULL);
 }
 
+/* Ports of the computer's own, as kernels from 6.10 on have them: with a chip (type 4), and without (type 0). */
+static void plug_own(UMockdevTestbed *bed, const char *name, int type)
+{
+	char text[1024];
+	GError *error = NULL;
+	snprintf(text, sizeof(text),
+			 "P: /devices/pnp0/00:00/%s:0\nE: SUBSYSTEM=serial-base\n\n"
+			 "P: /devices/pnp0/00:00/%s:0/tty/%s\nN: %s\nE: SUBSYSTEM=tty\nE: DEVNAME=/dev/%s\nA: type=%d\\n\n\n",
+			 name, name, name, name, name, type);
+	if (!umockdev_testbed_add_from_string(bed, text, &error))
+		fail_msg("%s", error->message);
+}
+
+static bool keep_line(void *context, const char *name, const char *description)
+{
+	char *lines = context;
+	const size_t n = strlen(lines);
+	snprintf(lines + n, 1024 - n, "%s: %s\n", name, description);
+	return true;
+}
+
+static void test_ports_without_hardware_are_not_listed(void **state)
+{
+	(void)state;
+	UMockdevTestbed *bed = umockdev_testbed_new();
+	const adapter usb = {"ttyUSB0", "1-2", "0", "FT1"};
+	char lines[1024] = "";
+	plug_own(bed, "ttyS0", 4);
+	plug_own(bed, "ttyS1", 0);
+	plug(bed, &usb);
+	assert_true(tactus_port_list(keep_line, lines));
+	assert_non_null(strstr(lines, "/dev/ttyS0: serial port\n"));
+	assert_null(strstr(lines, "ttyS1"));
+	assert_non_null(strstr(lines, ", usb 0403:6011, serial FT1\n"));
+	g_object_unref(bed);
+}
+
+static void test_the_remedy_of_a_port_is_its_own_group(void **state)
+{
+	(void)state;
+	char path[] = "/tmp/tactus-port-XXXXXX", text[TACTUS_PERMISSION_SIZE];
+	const int fd = mkstemp(path);
+	assert_true(fd >= 0 && fchown(fd, (uid_t)-1, getegid()) == 0);
+	assert_int_equal(fchmod(fd, 0660), 0);
+	assert_non_null(strstr(tactus_permission_port_remedy(path, text), "sudo usermod -aG "));
+	assert_int_equal(fchmod(fd, 0600), 0);
+	assert_null(strstr(tactus_permission_port_remedy(path, text), "usermod"));
+	unlink(path);
+	close(fd);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_an_adapter_with_a_serial_number_is_found_under_any_name_in_any_socket),
 		cmocka_unit_test(test_one_without_a_serial_number_is_the_one_in_the_same_socket),
 		cmocka_unit_test(test_one_with_several_ports_is_known_by_its_interface),
+		cmocka_unit_test(test_ports_without_hardware_are_not_listed),
+		cmocka_unit_test(test_the_remedy_of_a_port_is_its_own_group),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
