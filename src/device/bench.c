@@ -198,6 +198,10 @@ static int check(const tactus_toml_node *root, const tactus_bench *bench)
 		return tactus_toml_fail(root, "wiring", TACTUS_ERR_INPUT,
 								"switch_lines has %zu lines for %zu sensors, which are in the order of their channels",
 								bench->wiring.switch_count, bench->sensor_count);
+	if (bench->wiring.switch_count != 0 && !bench->wiring.switch_active_known) /* all closed but one would go unseen */
+		return tactus_toml_fail(root, "wiring", TACTUS_ERR_INPUT,
+								"switch_lines need switch_active, the level that closes a switch: \"low\" for an "
+								"ADG441 or ADG444, \"high\" for an ADG442");
 	if (bench->wiring.waveform_count > bench->sensor_count)
 		return tactus_toml_fail(
 			root, "wiring", TACTUS_ERR_INPUT,

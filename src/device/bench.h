@@ -40,8 +40,8 @@ typedef struct {
 	bool present;                               /* the file has a [wiring] */
 	int switch_lines[TACTUS_BENCH_SENSORS_MAX]; /* digital line that closes the switch of the i-th sensor */
 	size_t switch_count;
-	bool switch_active_low; /* the polarity of the switches' logic inputs */
-	int source_line;        /* line that selects the source: AC when high, unless: */
+	bool switch_active_low, switch_active_known; /* the polarity of the switches' logic inputs */
+	int source_line;                             /* line that selects the source: AC when high, unless: */
 	bool source_ac_low;
 	int dc_output;         /* analog output that is the DC source */
 	double dc_output_gain; /* volts at the sensors per volt of that output */

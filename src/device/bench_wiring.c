@@ -82,6 +82,7 @@ int tactus_bench_read_wiring(const tactus_toml_node *root, tactus_bench *bench)
 		status = read_indices(wiring, "waveform_inputs", INPUTS_MAX, w->waveform_inputs, &w->waveform_count);
 	if (status >= 0)
 		status = read_level(wiring, "switch_active", &w->switch_active_low);
+	w->switch_active_known = w->switch_active_known || status > 0;
 	if (status >= 0)
 		status = read_level(wiring, "source_ac", &w->source_ac_low);
 	for (size_t i = 0; i < TACTUS_COUNT(indices) && status >= 0; i++)

@@ -7,7 +7,7 @@ URI=usb:09db:00ea
 
 # Switches open, no scan runs, and nobody asked for the firmware to be erased.
 is_safe() {
-	usb_is latch=0 running=0 erase=0
+	usb_is latch=255 tristate=0 running=0 erase=0
 }
 
 # The resistances behind the switches, by channel.
@@ -148,12 +148,13 @@ test_a_closed_pipe_leaves_the_switches_open() {
 }
 
 test_settings_out_of_range_are_refused_before_anything_is_written() {
+	before=$(usb state | grep -o 'latch=[0-9]* tristate=[0-9]*')
 	status=0
 	tactus scan $URI --mode dc --rate 1e6 --count 1 >out 2>err || status=$?
 	cat err
 	[ $status -ne 0 ]
 	[ ! -s out ]
-	usb_is latch=0
+	[ "$(usb state | grep -o 'latch=[0-9]* tristate=[0-9]*')" = "$before" ]
 }
 
 test_a_scale_as_reference_beside_the_scan() {

@@ -133,9 +133,9 @@ static void switched_sensors_read_calibrated_volts(void **state)
 	for (int k = 0; k < 8; k++) {
 		uint8_t pair[8], code[2], latch;
 		float slope, offset;
-		assert_int_equal(out(&h, 0x02, 1u << k, NULL, 0), 0);
+		assert_int_equal(out(&h, 0x02, 0xffu & ~(1u << k), NULL, 0), 0);
 		assert_int_equal(in(&h, 0x02, 0, 0, &latch, 1), 1);
-		assert_int_equal(latch, 1 << k);
+		assert_int_equal(latch, 0xff & ~(1 << k));
 		unsigned range = k < 4 ? 0 : 5; /* ±10 V, then ±1 V for the small ones */
 		double full_scale_V = k < 4 ? 10 : 1;
 		assert_int_equal(in(&h, 0x30, range * 64 + 16, 0, pair, 8), 8);
@@ -145,7 +145,7 @@ static void switched_sensors_read_calibrated_volts(void **state)
 		double volts = (rig_get16(code) * (double)slope + (double)offset - 32768) * full_scale_V / 32768;
 		assert_true(fabs(volts - 5 * 1800 / (resistance_ohm[k] + 78)) <= full_scale_V / 32768);
 	}
-	assert_int_equal(out(&h, 0x02, 0, NULL, 0), 0);
+	assert_int_equal(out(&h, 0x02, 0xff, NULL, 0), 0);
 	close_device(&h);
 }
 

@@ -65,12 +65,12 @@ typedef struct {
 
 /* ---- the bench and the converter ---- */
 
-/* A switch is closed when its line is an output and latched high; closed ones are in parallel. */
+/* ADG441: a switch is closed when its line is low, and nobody's line is pulled up; closed ones are in parallel. */
 static double closed_conductance_S(const daq *d)
 {
 	double conductance_S = 0;
 	for (int k = 0; k < SENSORS; k++)
-		if ((d->latch & ~d->tristate & 1 << k) != 0)
+		if (((d->latch | d->tristate) & 1 << k) == 0)
 			conductance_S += 1 / (d->resistance_ohm[k] + d->switch_ohm);
 	return conductance_S;
 }
@@ -270,8 +270,8 @@ static int read_request(daq *d, const uint8_t setup[8], uint8_t *data, size_t le
 	switch (setup[1]) {
 	case TRISTATE:
 		return give(data, length, &d->tristate, 1);
-	case PORT: /* nothing but the switches hangs on the lines: an input reads low */
-		answer[0] = d->latch & (uint8_t)~d->tristate;
+	case PORT: /* nothing but the switches hangs on the lines: an input reads high */
+		answer[0] = d->latch | d->tristate;
 		return give(data, length, answer, 1);
 	case LATCH:
 		return give(data, length, &d->latch, 1);

@@ -8,9 +8,9 @@
 
 #define BENCH "kind = \"bench\"\nbase = \"paredes\"\n[scan]\nrate_Hz = 1\nsettle_s = 0\n"
 
-static const char wave_1608[] =
-	BENCH "modes = [\"ac\"]\nfrequency_Hz = 1000\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, 5, 6, 7]\n"
-		  "amplitude_input = 4\ndrive_input = 1\n";
+static const char wave_1608[] = BENCH "modes = [\"ac\"]\nfrequency_Hz = 1000\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, "
+									  "5, 6, 7]\nswitch_active = \"high\"\n"
+									  "amplitude_input = 4\ndrive_input = 1\n";
 
 /*
  * Opens a device on a bench of that text. Requests that are answered may take as long as they like on a machine that is

@@ -59,8 +59,9 @@ static const tactus_daq_operations operations = {
 	.set_lines = set_lines, .set_output = set_output, .read_inputs = read_inputs};
 
 /* Two sensors: lines 4 and 5 close their switches (active low where asked), line 8 selects AC, input 2 is DC. */
-static const char wiring[] = "[wiring]\nswitch_lines = [4, 5]\nsource_line = 8\ndc_output = 0\ndc_output_gain = -1\n"
-							 "amplitude_input = 0\nphase_input = 1\ndc_input = 2\ninput_range_V = 10\n";
+static const char wiring[] =
+	"[wiring]\nswitch_lines = [4, 5]\nswitch_active = \"high\"\nsource_line = 8\ndc_output = 0\ndc_output_gain = -1\n"
+	"amplitude_input = 0\nphase_input = 1\ndc_input = 2\ninput_range_V = 10\n";
 static const char bench_head[] =
 	"kind = \"bench\"\nprotocol = \"hold 1N 1s\"\n[scan]\nrate_Hz = 1000\nsettle_s = 0\ndrive_V = 1\ndc_drive_V = -2\n"
 	"frequency_Hz = 4000\n[amplifier]\ngain_resistor_ohm = 1000\n[adc]\nbits = 16\nminimum_V = -10\nmaximum_V = 10\n"
@@ -140,14 +141,37 @@ static void test_every_reading_selects_settles_and_reads(void **state)
 static void test_polarities_turn_levels_round(void **state)
 {
 	(void)state;
-	char low[512];
-	snprintf(low, sizeof(low), "%sswitch_active = \"low\"\nsource_ac = \"low\"\n", wiring);
-	rig *r = new_rig(low);
+	rig *r =
+		new_rig("[wiring]\nswitch_lines = [4, 5]\nswitch_active = \"low\"\nsource_line = 8\nsource_ac = \"low\"\n");
 	const tactus_wiring *w = &r->daq.bench->wiring;
 	assert_int_equal(tactus_wiring_levels(w, -1, TACTUS_MODE_AC), 0x030); /* all open is all high */
 	assert_int_equal(tactus_wiring_levels(w, 1, TACTUS_MODE_DC), 0x110);
 	assert_int_equal(tactus_wiring_mask(w), 0x130);
 	free_rig(r);
+}
+
+/* With the wrong polarity all switches are closed but one, and nothing of a reading shows it. */
+static void test_the_polarity_of_switches_is_never_guessed(void **state)
+{
+	(void)state;
+	static const char *const profiles[] = {"labjack-t7", "labjack-t4", "mcc-usb-1608fs-plus", "mcc-usb-201",
+										   "mcc-usb-202"};
+	tactus_bench *bench = NULL;
+	char text[512];
+	snprintf(text, sizeof(text), "%s[wiring]\nswitch_lines = [4, 5]\n", bench_head);
+	char *path = rig_file(".toml", text);
+	assert_int_equal(tactus_bench_open(path, &bench), TACTUS_ERR_INPUT);
+	assert_non_null(strstr(tactus_error_message(), "switch_active"));
+	rig_remove(path);
+	/* those that are built in have the paper's ADG441, which a low level closes */
+	for (size_t i = 0; i < COUNT(profiles); i++) {
+		assert_int_equal(tactus_bench_open(profiles[i], &bench), 0);
+		const tactus_wiring *w = &bench->wiring;
+		const uint32_t open = tactus_wiring_levels(w, -1, TACTUS_MODE_DC);
+		assert_int_equal(open ^ tactus_wiring_levels(w, 0, TACTUS_MODE_DC), UINT32_C(1) << w->switch_lines[0]);
+		assert_true((open >> w->switch_lines[0] & 1) == 1);
+		tactus_bench_free(bench);
+	}
 }
 
 static void test_a_switch_that_stays_is_not_set_again(void **state)
@@ -246,6 +270,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_every_reading_selects_settles_and_reads),
 		cmocka_unit_test(test_polarities_turn_levels_round),
+		cmocka_unit_test(test_the_polarity_of_switches_is_never_guessed),
 		cmocka_unit_test(test_a_switch_that_stays_is_not_set_again),
 		cmocka_unit_test(test_a_scan_with_a_fault_is_a_gap_and_a_lost_link_is_said),
 		cmocka_unit_test(test_what_the_device_cannot_do_is_refused_before_anything_is_written),

@@ -22,11 +22,12 @@ int __open_2(const char *path, int flags)                                       
 	return real(path, flags);
 }
 
-static const char dc_202[] =
-	BENCH "modes = [\"dc\"]\ndc_drive_V = -2.5\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, 5, 6, 7]\n"
-		  "dc_output = 1\ndc_output_gain = -1\ndc_input = 2\namplitude_input = 0\nphase_input = 1\n";
-static const char ac_1608[] = BENCH "modes = [\"ac\"]\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, 5, 6, 7]\n"
-									"amplitude_input = 5\nphase_input = 2\ndc_input = 3\ninput_range_V = 5\n";
+static const char dc_202[] = BENCH
+	"modes = [\"dc\"]\ndc_drive_V = -2.5\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, 5, 6, 7]\nswitch_active = \"high\"\n"
+	"dc_output = 1\ndc_output_gain = -1\ndc_input = 2\namplitude_input = 0\nphase_input = 1\n";
+static const char ac_1608[] =
+	BENCH "modes = [\"ac\"]\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, 5, 6, 7]\nswitch_active = \"high\"\n"
+		  "amplitude_input = 5\nphase_input = 2\ndc_input = 3\ninput_range_V = 5\n";
 
 /* Whether anything but questions was sent since then, beside the end of a scan that nobody began. */
 static bool wrote(const mock_usb *usb, size_t from)
@@ -390,14 +391,19 @@ static void test_settings_are_checked_before_anything_is_written(void **state)
 		 "uses input 8"},
 		{0x012b, BENCH "modes = [\"dc\"]\n[wiring]\ndc_input = 2\n", "", {.modes = TACTUS_MODE_DC}, "need switches"},
 		{0x012b,
-		 BENCH "modes = [\"dc\"]\n[wiring]\nswitch_lines = [1, 2, 3, 4, 5, 6, 7, 8]\ndc_input = 2\n",
+		 BENCH "modes = [\"dc\"]\n[wiring]\nswitch_lines = [1, 2, 3, 4, 5, 6, 7, 8]\nswitch_active = "
+			   "\"high\"\ndc_input = 2\n",
 		 "",
 		 {0},
 		 "line 8"},
-		{0x012b, BENCH "modes = [\"dc\"]\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, 5, 6, 7]\n", "", {0}, "no dc_input"},
 		{0x012b,
-		 BENCH
-		 "modes = [\"dc\"]\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, 5, 6, 7]\ndc_input = 2\ninput_range_V = 20\n",
+		 BENCH "modes = [\"dc\"]\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, 5, 6, 7]\nswitch_active = \"high\"\n",
+		 "",
+		 {0},
+		 "no dc_input"},
+		{0x012b,
+		 BENCH "modes = [\"dc\"]\n[wiring]\nswitch_lines = [0, 1, 2, 3, 4, 5, 6, 7]\nswitch_active = "
+			   "\"high\"\ndc_input = 2\ninput_range_V = 20\n",
 		 "",
 		 {0},
 		 "more than the 10 V"},

@@ -353,12 +353,13 @@ static void test_what_is_switched_is_read_in_bursts(void **state)
 	tactus_reading readings[16];
 	usb->input_V = source_V;
 	mock_plug(usb, 1);
-	tactus_device *device = open_bench("09db:00ea",
-									   "kind = \"bench\"\nbase = \"lebosse\"\n[scan]\nrate_Hz = 5\nsettle_s = 0\n"
-									   "modes = [\"dc\", \"ac\"]\nfrequency_Hz = 1000\ndrive_V = 2\ndc_drive_V = -5\n"
-									   "[wiring]\nswitch_lines = [0, 1]\nsource_line = 7\namplitude_input = 4\n"
-									   "drive_input = 1\n",
-									   "&stream=50kHz&samples=640&timeout=10s");
+	tactus_device *device =
+		open_bench("09db:00ea",
+				   "kind = \"bench\"\nbase = \"lebosse\"\n[scan]\nrate_Hz = 5\nsettle_s = 0\n"
+				   "modes = [\"dc\", \"ac\"]\nfrequency_Hz = 1000\ndrive_V = 2\ndc_drive_V = -5\n"
+				   "[wiring]\nswitch_lines = [0, 1]\nswitch_active = \"high\"\nsource_line = 7\namplitude_input = 4\n"
+				   "drive_input = 1\n",
+				   "&stream=50kHz&samples=640&timeout=10s");
 	const tactus_scan_settings settings = tactus_scan_defaults();
 	start(device, &settings);
 	for (int scan = 0; scan < 2; scan++) {
