@@ -194,6 +194,11 @@ static int check(const tactus_profile_reader *r, const tactus_toml_node *root)
 	const unsigned missing = p->scan.modes & ~p->modes;
 	if (p->column_count == 0)
 		return tactus_toml_fail(root, NULL, TACTUS_ERR_INPUT, "the profile reads nothing: it has no [[register]]");
+	for (size_t i = 0; i < p->column_count && p->has_counter; i++)
+		if (p->columns[i].value.every > 1)
+			return tactus_toml_fail(root, "counter", TACTUS_ERR_INPUT,
+									"a device that counts its own scans is read whole: no register has every = %d",
+									p->columns[i].value.every);
 	if (p->modes != 0 && tactus_metadata_get_number(p->metadata, "gain_resistor_ohm", &ohm) <= 0)
 		return tactus_toml_fail(root, NULL, TACTUS_ERR_INPUT,
 								"amplitudes need the amplifier's resistor: gain_resistor_ohm in [metadata]");

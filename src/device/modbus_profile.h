@@ -82,7 +82,8 @@ typedef struct {
  * FILE:LINE:COLUMN. */
 int tactus_profile_open(const char *name, bool serial, tactus_profile **profile);
 void tactus_profile_free(tactus_profile *profile);
-/* The value a column has in a reading. */
+/* What a column is called, and the value it has in a reading. */
+const char *tactus_profile_column_name(const tactus_profile *profile, const tactus_profile_column *column);
 double *tactus_profile_field(const tactus_profile_column *column, tactus_reading *reading);
 
 #endif

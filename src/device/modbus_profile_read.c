@@ -107,6 +107,16 @@ static const struct {
 };
 enum { AMPLITUDES = 5 }; /* the first ones */
 
+const char *tactus_profile_column_name(const tactus_profile *profile, const tactus_profile_column *column)
+{
+	if (column->what == TACTUS_PROFILE_EXTRA)
+		return profile->extras[column->index];
+	for (size_t i = 0; i < TACTUS_COUNT(fields) && column->what == TACTUS_PROFILE_FIELD; i++)
+		if (fields[i].offset == column->index)
+			return fields[i].name;
+	return "clipped";
+}
+
 double *tactus_profile_field(const tactus_profile_column *column, tactus_reading *reading)
 {
 	return column->what == TACTUS_PROFILE_EXTRA ? &reading->extra[column->index]
@@ -217,6 +227,7 @@ static int read_register(const tactus_profile_reader *r, const tactus_toml_node 
 	status = status < 0 ? status : tactus_profile_integer(node, "channel", 1, 999, &column.channel);
 	status = status < 0 ? status : tactus_profile_integer(node, "count", 1, TACTUS_PROFILE_CHANNELS_MAX, &count);
 	status = status < 0 ? status : tactus_profile_integer(node, "stride", 1, 65535, &stride);
+	status = status < 0 ? status : tactus_profile_integer(node, "every", 1, 1000000, &column.value.every);
 	if (status >= 0 && count > 1 && column.channel == 0)
 		return tactus_toml_fail(node, "count", TACTUS_ERR_INPUT,
 								"count is a number of channels; channel says the first of them");

@@ -231,6 +231,7 @@ static int registers_start(tactus_device *device, const tactus_scan_settings *se
 	if (code < 0)
 		return code;
 	tactus_modbus_set_timeout(r->link, settings->timeout_s);
+	tactus_poll_restart(&r->poll);
 	code = measure(device, r);
 	code = code < 0 ? code : write_start(r);
 	if (code == TACTUS_ERR_LOST)
@@ -252,6 +253,7 @@ static int registers_reopen(tactus_device *device)
 	code = code < 0 ? code : identify(r, true);
 	code = code < 0 ? code : tactus_poll_read(&r->poll, 0, r->link); /* a port that opens is no device yet */
 	code = code < 0 ? code : write_start(r);
+	tactus_poll_restart(&r->poll);
 	r->failed = 0;
 	r->counted = false;
 	r->resumed = true;

@@ -171,10 +171,23 @@ static int say_channels(const tactus_registers *r, tactus_metadata *metadata)
 	return r->channel_count > 0 ? tactus_metadata_set(metadata, "channels", text) : TACTUS_OK;
 }
 
+/* A value that is read in every so-manieth scan is the last one in those between. */
+static int say_held(const tactus_profile *p, tactus_metadata *metadata)
+{
+	int code = TACTUS_OK;
+	for (size_t i = 0; i < p->column_count && code >= 0; i++) {
+		char key[TACTUS_EXTRA_SIZE + 16];
+		snprintf(key, sizeof(key), "%s_every_scans", tactus_profile_column_name(p, &p->columns[i]));
+		if (p->columns[i].value.every > 1)
+			code = tactus_metadata_set_number(metadata, key, p->columns[i].value.every);
+	}
+	return code;
+}
+
 static int say_profile(const tactus_registers *r, tactus_metadata *metadata)
 {
 	const tactus_metadata *said = r->profile->metadata;
-	int code = TACTUS_OK;
+	int code = say_held(r->profile, metadata);
 	for (size_t i = 0; i < tactus_metadata_count(said) && code >= 0; i++)
 		code = tactus_metadata_set(metadata, tactus_metadata_key(said, i), tactus_metadata_value(said, i));
 	for (size_t i = 0; i < r->profile->fact_count && code >= 0; i++)

@@ -147,8 +147,15 @@ int tactus_value_put(const tactus_value *value, double number, uint16_t *registe
 
 /* ---- polls ---- */
 
+static int every(const tactus_value *value)
+{
+	return value->every > 1 ? value->every : 1;
+}
+
 static int compare(const tactus_value *a, const tactus_value *b)
 {
+	if (every(a) != every(b))
+		return every(a) - every(b);
 	return a->table != b->table ? (int)a->table - (int)b->table : a->address - b->address;
 }
 
@@ -168,8 +175,20 @@ static bool reaches(const tactus_poll_request *request, const tactus_value *valu
 {
 	const size_t most = tactus_value_is_bits(value->table) ? TACTUS_MODBUS_READ_BITS_MAX : TACTUS_MODBUS_READ_MAX;
 	const int end = request->address + (int)request->count;
-	return value->table == request->table && value->address - end <= max_gap &&
+	return value->table == request->table && every(value) == request->every && value->address - end <= max_gap &&
 		   (size_t)(value->address + tactus_value_size(value) - request->address) <= most;
+}
+
+/* The request that reads all of a value already, NULL if none does. */
+static const tactus_poll_request *covering(const tactus_poll *poll, const tactus_value *value)
+{
+	for (size_t i = 0; i < poll->count; i++) {
+		const tactus_poll_request *r = &poll->requests[i];
+		if (r->table == value->table && r->address <= value->address &&
+			value->address + tactus_value_size(value) <= r->address + (int)r->count)
+			return r;
+	}
+	return NULL;
 }
 
 /* From the lowest address on, each request as long as it can be: no other division needs fewer. */
@@ -178,10 +197,16 @@ static void divide(tactus_poll *poll, const tactus_value *const *values, size_t 
 {
 	for (size_t i = 0; i < n; i++) {
 		const tactus_value *value = values[order[i]];
+		const tactus_poll_request *there = covering(poll, value);
+		if (there != NULL) {
+			places[order[i]] = there->at + (size_t)(value->address - there->address);
+			continue;
+		}
 		tactus_poll_request *request = poll->count > 0 ? &poll->requests[poll->count - 1] : NULL;
 		if (request == NULL || !reaches(request, value, max_gap)) {
 			request = &poll->requests[poll->count++];
-			*request = (tactus_poll_request){value->table, value->address, 0, poll->word_count};
+			*request = (tactus_poll_request){
+				.table = value->table, .address = value->address, .at = poll->word_count, .every = every(value)};
 		}
 		const size_t end = (size_t)(value->address + tactus_value_size(value) - request->address);
 		if (end > request->count) {
@@ -230,7 +255,20 @@ int tactus_poll_read(const tactus_poll *poll, size_t i, tactus_modbus *link)
 int tactus_poll_run(const tactus_poll *poll, tactus_modbus *link)
 {
 	int code = TACTUS_OK;
-	for (size_t i = 0; i < poll->count && code >= 0; i++)
+	for (size_t i = 0; i < poll->count && code >= 0; i++) {
+		tactus_poll_request *r = &poll->requests[i];
+		if (r->rest > 0) {
+			r->rest--;
+			continue;
+		}
 		code = tactus_poll_read(poll, i, link);
+		r->rest = code >= 0 ? r->every - 1 : 0;
+	}
 	return code;
+}
+
+void tactus_poll_restart(tactus_poll *poll)
+{
+	for (size_t i = 0; i < poll->count; i++)
+		poll->requests[i].rest = 0;
 }

@@ -27,6 +27,7 @@ typedef struct {
 	enum tactus_value_order order;
 	int bit; /* of its register, from the lowest */
 	double scale, offset;
+	int every; /* of a poll: it is read in every so-manieth; 0 and 1: in each */
 } tactus_value;
 
 /* Registers (or bits, for coils and discrete inputs) that it takes up. */
@@ -46,6 +47,7 @@ typedef struct {
 	enum tactus_modbus_table table;
 	int address;
 	size_t count, at;
+	int every, rest; /* polls that it is left out of after each time; those that are left of them */
 } tactus_poll_request;
 
 typedef struct {
@@ -56,15 +58,17 @@ typedef struct {
 } tactus_poll;
 
 /*
- * The fewest requests that read n values, which are sorted by table and address and get their place in poll->words:
- * places[i]. Up to max_gap registers (or bits) that nobody asked for are read over. TACTUS_ERR_MEMORY. Free with
- * tactus_poll_clear().
+ * The fewest requests that read n values, which are sorted by how often, table and address and get their place in
+ * poll->words: places[i]. Up to max_gap registers (or bits) that nobody asked for are read over; a slow value that lies
+ * in what is read anyway costs no request. TACTUS_ERR_MEMORY. Free with tactus_poll_clear().
  */
 int tactus_poll_make(tactus_poll *poll, const tactus_value *const *values, size_t n, int max_gap, size_t *places);
 void tactus_poll_clear(tactus_poll *poll);
-/* All requests, in turn; the first error. */
+/* All requests that are due, in turn; the first error, after which that request is still due. */
 int tactus_poll_run(const tactus_poll *poll, tactus_modbus *link);
-/* One of them. */
+/* All are due in the next run. */
+void tactus_poll_restart(tactus_poll *poll);
+/* One of them, due or not. */
 int tactus_poll_read(const tactus_poll *poll, size_t request, tactus_modbus *link);
 
 #endif

@@ -104,6 +104,32 @@ static void test_values_are_read_in_the_fewest_requests(void **state)
 	}
 }
 
+static void test_a_slow_value_has_a_request_of_its_own_unless_it_is_read_anyway(void **state)
+{
+	(void)state;
+	static const struct {
+		int fast[2], slow;
+		size_t requests;
+		int first_every, last_every;
+	} cases[] = {
+		{{0, 1}, 2, 2, 1, 10}, /* beside them: they are not made longer for it */
+		{{0, 2}, 1, 1, 1, 1},  /* between them: it costs nothing */
+		{{7, 8}, 0, 2, 1, 10}, /* what is read often comes first */
+	};
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		const tactus_value slow = {.address = cases[i].slow, .every = 10}, first = {.address = cases[i].fast[0]},
+						   second = {.address = cases[i].fast[1]};
+		const tactus_value *values[] = {&slow, &second, &first};
+		size_t places[3];
+		tactus_poll poll;
+		assert_int_equal(tactus_poll_make(&poll, values, 3, 8, places), 0);
+		assert_int_equal(poll.count, cases[i].requests);
+		assert_int_equal(poll.requests[0].every, cases[i].first_every);
+		assert_int_equal(poll.requests[poll.count - 1].every, cases[i].last_every);
+		tactus_poll_clear(&poll);
+	}
+}
+
 /* ---- files ---- */
 
 #define HEAD "kind = \"profile\"\ndriver = \"registers\"\n"
@@ -141,6 +167,8 @@ static void test_what_is_wrong_in_a_profile_is_said_with_its_place(void **state)
 		{ONE "[[start]]\naddress = 3\nvalue = 1\ntable = \"input\"\n", "can be written"},
 		{ONE "[[start]]\naddress = 3\nfrom = \"colour\"\n", "none of value, channels"},
 		{ONE "[counter]\naddress = 3\ntype = \"f32\"\n", "u16 or u32"},
+		{ONE "every = 0\n", "from 1 to 1000000"},
+		{ONE "every = 3\n[counter]\naddress = 3\n", "read whole"},
 		{ONE "[link]\nunit = 256\n", "from 0 to 255"},
 		{ONE "[link]\ntimeout_s = 0\n", "out of range"},
 		{ONE "[scan]\nmodes = [\"xy\"]\n", "\"dc\" or \"ac\""},
@@ -365,6 +393,41 @@ static void test_other_quantities_become_further_columns(void **state)
 	bench_stop(&b);
 }
 
+/* How often the thermometer was asked is what it says. */
+static void count_thermometer(modbus_bench *b, int function, int address, const uint8_t *payload)
+{
+	(void)function;
+	(void)payload;
+	if (address == 100)
+		b->tables->tab_registers[100] = (uint16_t)++b->count;
+}
+
+static void test_a_slow_register_is_read_in_every_so_manieth_scan_and_held_between(void **state)
+{
+	(void)state;
+	modbus_bench b = {.touch = count_thermometer};
+	bench_start(&b);
+	char *path = rig_file(".toml", ONE "[[register]]\naddress = 100\ncolumn = \"temperature_degC\"\nevery = 4\n");
+	tactus_device *device = NULL;
+	tactus_reading reading;
+	assert_int_equal(tactus_device_open(bench_uri(&b, path, "&timeout=5s"), &device), 0);
+	assert_int_equal(tactus_device_start(device, NULL), 0);
+	assert_string_equal(tactus_metadata_get(tactus_device_metadata(device), "temperature_degC_every_scans"), "4");
+	const double before = b.count; /* the round trips of the start */
+	for (int i = 0; i < 10; i++) {
+		assert_int_equal(tactus_device_read(device, &reading, 1), 1);
+		assert_near(reading.temperature_degC, before + 1 + i / 4, 0);
+	}
+	/* found again: nobody knows what it was meanwhile */
+	assert_int_equal(tactus_device_recover(device, 10), 0);
+	const double found = b.count;
+	assert_int_equal(tactus_device_read(device, &reading, 1), 1);
+	assert_near(reading.temperature_degC, found + 1, 0);
+	tactus_device_close(device);
+	rig_remove(path);
+	bench_stop(&b);
+}
+
 /* ---- what goes wrong ---- */
 
 /* The second write is past the last register: what the first did is undone. */
@@ -529,6 +592,7 @@ int main(void)
 		cmocka_unit_test(test_values_in_every_order_and_type),
 		cmocka_unit_test(test_a_number_that_does_not_fit_is_refused),
 		cmocka_unit_test(test_values_are_read_in_the_fewest_requests),
+		cmocka_unit_test(test_a_slow_value_has_a_request_of_its_own_unless_it_is_read_anyway),
 		cmocka_unit_test(test_what_is_wrong_in_a_profile_is_said_with_its_place),
 		cmocka_unit_test(test_a_profile_starts_from_another),
 		cmocka_unit_test(test_the_board_is_told_and_read_over_tcp),
@@ -536,6 +600,7 @@ int main(void)
 		cmocka_unit_test(test_settings_are_refused_before_anything_is_written),
 		cmocka_unit_test(test_another_device_is_refused),
 		cmocka_unit_test(test_other_quantities_become_further_columns),
+		cmocka_unit_test(test_a_slow_register_is_read_in_every_so_manieth_scan_and_held_between),
 		cmocka_unit_test(test_a_start_that_fails_half_way_leaves_the_device_safe),
 		cmocka_unit_test(test_a_device_that_falls_silent_is_lost_and_found_again),
 		cmocka_unit_test(test_a_silent_device_is_not_found_by_its_port_alone),
