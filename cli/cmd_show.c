@@ -11,6 +11,8 @@ static bool looks_like_toml(const char *file)
 	char line[256];
 	bool toml = strncmp(file, "sim:", 4) == 0, begins = true;
 	FILE *stream = strcmp(file, "-") != 0 && !toml ? fopen(file, "r") : NULL;
+	if (!stream && !toml)
+		return tactus_bench_is(file) || tactus_profile_is(file); /* built in */
 	while (stream && fgets(line, sizeof line, stream)) {
 		bool whole = strchr(line, '\n') != NULL, blank = line[strspn(line, " \t\r\n")] == '\0';
 		if (begins && line[0] != '#' && !blank) {
@@ -45,19 +47,21 @@ static const struct cli_option options[] = {
 
 const struct cli_command cli_show = {
 	.name = "show",
-	.summary = "say what a recording, a model or a bench is; list the known effects",
+	.summary = "say what a recording, a model, a bench or a device's profile is; list effects",
 	.arguments = "[FILE | EFFECT]",
 	.description =
 		"Of a recording: its domain, rows, channels, every column with its range and how many values are missing, the "
 		"clock (rate, gaps, repeats), lost scans, and the metadata.\n\n"
 		"Of a model: its form, what it computes from what, the parameters of every channel with their standard "
 		"errors, the range that it is valid in, its errors, and where it came from. Of a bench: what the bench is "
-		"made of.\n\n"
+		"made of, and how it hangs on a device. Of a profile of a device: whose driver reads it, what is written, and "
+		"which register or field every column comes from. Built-in benches and profiles are shown by their names.\n\n"
 		"With --effects, the catalogue of physical causes that a model may have beside the base equations: what each "
 		"does, where it is published, its parameters, what a recording must contain for it to be found, and what it is "
 		"confused with.",
 	.examples = "tactus show run.csv\n"
 				"tactus show model.toml --json\n"
+				"tactus show tactus-board   # a built-in profile\n"
 				"tactus show --effects creep\n",
 	.options = options,
 	.arguments_max = 1,

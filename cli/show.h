@@ -1,10 +1,11 @@
-/* The three things that `tactus show` explains; each prints text, or JSON with --json, and returns an exit status. */
+/* The things that `tactus show` explains; each prints text, or JSON with --json, and returns an exit status. */
 #ifndef TACTUS_CLI_SHOW_H
 #define TACTUS_CLI_SHOW_H
 
 #include "cli.h"
 
 int cli_show_recording(const struct cli *cli, const char *file);
+/* A model, a bench or a profile of a device. */
 int cli_show_model(const struct cli *cli, const char *file);
 /* The catalogue, or one effect of it. */
 int cli_show_effects(const struct cli *cli, const char *name);

@@ -210,7 +210,8 @@ static int show_bench(const struct cli *cli, const char *file)
 	if (cli_has(cli, "json")) {
 		status = json_model(model, file, facts);
 	} else {
-		printf("%s: bench\n", file);
+		const char *driver = tactus_metadata_get(facts, "driver");
+		printf("%s: bench%s%s\n", file, driver ? ", profile of " : "", driver ? driver : "");
 		print_metadata(facts);
 		puts("\nits sensors");
 		print_model(model, file);
@@ -220,10 +221,58 @@ static int show_bench(const struct cli *cli, const char *file)
 	return status;
 }
 
+static void json_metadata(struct cli_json *json, const char *key, const tactus_metadata *metadata)
+{
+	cli_json_object(json, key);
+	for (size_t i = 0; i < tactus_metadata_count(metadata); i++)
+		cli_json_string(json, tactus_metadata_key(metadata, i), tactus_metadata_value(metadata, i));
+	cli_json_close(json);
+}
+
+/* `key    text`, the text wrapped, its parts (that a column has in several channels) on lines of their own. */
+static void print_parts(const tactus_metadata *metadata)
+{
+	for (size_t i = 0; i < tactus_metadata_count(metadata); i++) {
+		const char *part = tactus_metadata_value(metadata, i);
+		printf("  %-22s ", tactus_metadata_key(metadata, i));
+		for (const char *end; (end = strstr(part, "; ")); part = end + 2)
+			printf("%.*s\n%25s", (int)(end - part), part, "");
+		puts(part);
+	}
+}
+
+static int show_profile(const struct cli *cli, const char *file)
+{
+	tactus_metadata *facts, *columns;
+	const int error = tactus_profile_describe(file, &facts, &columns);
+	if (error)
+		return cli_fail(cli, error);
+	int status = CLI_OK;
+	if (cli_has(cli, "json")) {
+		struct cli_json *json = cli_json_begin();
+		cli_json_string(json, "kind", "profile");
+		cli_json_string(json, "file", file);
+		json_metadata(json, "profile", facts);
+		json_metadata(json, "columns", columns);
+		status = cli_json_end(json);
+	} else {
+		printf("%s: profile of a device, driver %s\n", file, tactus_metadata_get(facts, "driver"));
+		print_parts(facts);
+		if (tactus_metadata_count(columns))
+			puts("\nits columns");
+		print_parts(columns);
+	}
+	tactus_metadata_free(facts);
+	tactus_metadata_free(columns);
+	return status;
+}
+
 int cli_show_model(const struct cli *cli, const char *file)
 {
 	if (tactus_bench_is(file))
 		return show_bench(cli, file);
+	if (tactus_profile_is(file))
+		return show_profile(cli, file);
 	tactus_model *model;
 	int error = tactus_model_read(file, &model);
 	if (error)

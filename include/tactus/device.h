@@ -132,7 +132,7 @@ TACTUS_API int tactus_device_list(bool (*found)(void *context, const char *uri, 
 
 /* ---- benches ---- */
 
-/** True for a "sim:" URI and for a bench file. */
+/** True for a "sim:" URI, for a bench file, and for the name of a built-in bench where there is no such file. */
 TACTUS_API bool tactus_bench_is(const char *path);
 /**
  * The films of a bench's sensors as a forward model of conductance and capacitance: base, effects and repeatability
@@ -143,6 +143,17 @@ TACTUS_API int tactus_bench_model(const char *bench, tactus_model **model);
 /** What a bench is made of, as `key: value` with units in the keys. Free with tactus_metadata_free(); errors as above.
  */
 TACTUS_API int tactus_bench_describe(const char *bench, tactus_metadata **facts);
+
+/* ---- profiles ---- */
+
+/** True for the built-in profile of a device that is no bench ("tactus-board"), and for a file of that kind. */
+TACTUS_API bool tactus_profile_is(const char *path);
+/**
+ * What a profile says: facts as `key: value` (driver, link, what is written at the start and the stop), and columns,
+ * each with the registers or fields that it comes from. Free both with tactus_metadata_free(); both are NULL after an
+ * error, TACTUS_ERR_DEVICE or TACTUS_ERR_INPUT with FILE:LINE:COLUMN.
+ */
+TACTUS_API int tactus_profile_describe(const char *profile, tactus_metadata **facts, tactus_metadata **columns);
 
 /**
  * Readings of a scan as a table in the contract's columns: raw (detector volts) or as amplitude and phase, ready for

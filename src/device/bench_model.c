@@ -1,6 +1,7 @@
 /* A bench as others see it: its sensors' films as a model that can be simulated, and its facts in words. */
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <tactus/device.h>
 
@@ -20,7 +21,9 @@ bool tactus_bench_is(const char *path)
 	const char *kind = "";
 	if (strncmp(path, "sim:", 4) == 0)
 		return true;
-	if (strcmp(path, "-") == 0 || tactus_toml_read(path, &document) < 0)
+	const char *text = access(path, F_OK) != 0 ? tactus_builtin_find(path) : NULL;
+	if (strcmp(path, "-") == 0 ||
+		(text != NULL ? tactus_toml_parse(path, text, &document) : tactus_toml_read(path, &document)) < 0)
 		return false;
 	const tactus_toml_node *root = tactus_toml_root(document);
 	tactus_toml_string(root, "kind", &kind);
@@ -103,19 +106,41 @@ int tactus_bench_model(const char *name, tactus_model **result)
 
 /* ---- in words ---- */
 
+static int say_list(tactus_metadata *facts, const char *key, const int *items, size_t n)
+{
+	char text[TACTUS_BENCH_SENSORS_MAX * 4] = "";
+	size_t length = 0;
+	for (size_t i = 0; i < n; i++)
+		length += (size_t)snprintf(text + length, sizeof(text) - length, "%s%d", i > 0 ? "," : "", items[i]);
+	return n > 0 ? tactus_metadata_set(facts, key, text) : TACTUS_OK;
+}
+
+/* How it hangs on a data acquisition device. */
+static int describe_wiring(const tactus_wiring *w, tactus_metadata *facts)
+{
+	const struct {
+		const char *key;
+		int index;
+	} indices[] = {
+		{"source_line", w->source_line}, {"dc_output", w->dc_output}, {"amplitude_input", w->amplitude_input},
+		{"phase_input", w->phase_input}, {"dc_input", w->dc_input},   {"drive_input", w->drive_input}};
+	int code = say_list(facts, "switch_lines", w->switch_lines, w->switch_count);
+	if (code >= 0 && w->switch_count > 0)
+		code = tactus_metadata_set(facts, "switch_active", w->switch_active_low ? "low" : "high");
+	code = code < 0 ? code : say_list(facts, "waveform_inputs", w->waveform_inputs, w->waveform_count);
+	for (size_t i = 0; i < TACTUS_COUNT(indices) && code >= 0; i++)
+		code = say_list(facts, indices[i].key, &indices[i].index, indices[i].index >= 0 ? 1 : 0);
+	return code;
+}
+
 static int describe(const tactus_bench *bench, tactus_metadata *facts)
 {
 	const bool dc = bench->scan.modes & TACTUS_MODE_DC, ac = bench->scan.modes & TACTUS_MODE_AC;
 	const struct {
 		const char *key, *text;
 	} texts[] = {
-		{"name", bench->name},
-		{"description", bench->description},
-		{"start", bench->start},
-		{"protocol", bench->protocol},
-		{"modes", dc && ac ? "dc,ac"
-				  : dc     ? "dc"
-						   : "ac"},
+		{"driver", bench->driver}, {"name", bench->name},         {"description", bench->description},
+		{"start", bench->start},   {"protocol", bench->protocol}, {"modes", dc && ac ? "dc,ac" : dc ? "dc" : "ac"},
 	};
 	const struct {
 		const char *key;
@@ -139,10 +164,10 @@ static int describe(const tactus_bench *bench, tactus_metadata *facts)
 	};
 	int code = TACTUS_OK;
 	for (size_t i = 0; i < TACTUS_COUNT(texts) && code >= 0; i++)
-		code = tactus_metadata_set(facts, texts[i].key, texts[i].text);
+		code = texts[i].text != NULL ? tactus_metadata_set(facts, texts[i].key, texts[i].text) : code;
 	for (size_t i = 0; i < TACTUS_COUNT(numbers) && code >= 0; i++)
 		code = tactus_metadata_set_number(facts, numbers[i].key, numbers[i].value);
-	return code;
+	return code < 0 || !bench->wiring.present ? code : describe_wiring(&bench->wiring, facts);
 }
 
 int tactus_bench_describe(const char *name, tactus_metadata **result)

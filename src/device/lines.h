@@ -33,4 +33,21 @@ bool tactus_lines_header(const char *line, size_t length, tactus_lines *lines);
  */
 bool tactus_lines_read(const tactus_lines *lines, const char *line, size_t length, double *values);
 
+/* ---- profiles: what a URI could say of a port, in a file ---- */
+
+typedef struct {
+	char *name, *description; /* NULL: not said */
+	int baud;
+	double timeout_s; /* NaN: not said */
+	bool has_columns;
+	tactus_lines lines;
+	tactus_metadata *metadata; /* for the recording */
+} tactus_lines_profile;
+
+/* 115200 baud and nothing else. TACTUS_ERR_MEMORY. Free with tactus_lines_profile_clear(). */
+int tactus_lines_profile_init(tactus_lines_profile *profile);
+void tactus_lines_profile_clear(tactus_lines_profile *profile);
+/* What the file says goes over what is there. TACTUS_ERR_INPUT with FILE:LINE:COLUMN. */
+int tactus_lines_profile_read(const char *path, tactus_lines_profile *profile);
+
 #endif

@@ -12,17 +12,6 @@ enum { BASES_MAX = 8 };
 #define NOT_NEGATIVE 0, INFINITY
 #define ANY -INFINITY, INFINITY
 
-static int read_copy(const tactus_toml_node *table, const char *key, char **text)
-{
-	const char *value = NULL;
-	const int status = tactus_toml_string(table, key, &value);
-	if (status <= 0)
-		return status;
-	free(*text);
-	*text = tactus_strndup(value, strlen(value));
-	return *text != NULL ? 1 : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
-}
-
 /* ---- tables ---- */
 
 static int read_link(const tactus_toml_node *root, tactus_profile *p)
@@ -98,26 +87,6 @@ static int read_detectors(const tactus_toml_node *root, tactus_profile_reader *r
 	return status <= 0 ? status : tactus_profile_keys(table, keys, TACTUS_COUNT(keys), &r->detectors);
 }
 
-/* What a recording says besides: any keys, numbers or texts. */
-static int read_metadata(const tactus_toml_node *root, tactus_profile *p)
-{
-	const tactus_toml_node *table = NULL;
-	int status = tactus_toml_table(root, "metadata", &table);
-	for (size_t i = 0; status > 0 && i < tactus_toml_size(table); i++) {
-		const char *key = tactus_toml_key(table, i), *text = NULL;
-		double number = NAN;
-		if (tactus_toml_is(table, key, 'n')) {
-			status = tactus_toml_number(table, key, &number);
-			status = status < 0 ? status : tactus_metadata_set_number(p->metadata, key, number);
-		} else {
-			status = tactus_toml_string(table, key, &text);
-			status = status < 0 ? status : tactus_metadata_set(p->metadata, key, text);
-		}
-		status = status < 0 ? status : 1;
-	}
-	return status;
-}
-
 /* The counter of the device's scans: read in front of their values and, at another address, behind them. */
 static int read_counter(const tactus_profile_reader *r, const tactus_toml_node *root)
 {
@@ -143,7 +112,7 @@ static int read_counter(const tactus_profile_reader *r, const tactus_toml_node *
 static int read_head(tactus_profile_reader *r, const tactus_toml_node *root)
 {
 	static const char *const orders[] = {"ABCD", "CDAB", "BADC", "DCBA", NULL};
-	const char *kind = NULL, *driver = NULL;
+	const char *kind = NULL;
 	double format = 1;
 	int order = TACTUS_ORDER_ABCD, first = 0;
 	int status = tactus_toml_string(root, "kind", &kind);
@@ -153,11 +122,11 @@ static int read_head(tactus_profile_reader *r, const tactus_toml_node *root)
 	status = status < 0 ? status : tactus_toml_number(root, "format", &format);
 	if (status >= 0 && format != 1)
 		return tactus_toml_fail(root, "format", TACTUS_ERR_INPUT, "format %g is newer than this program", format);
-	status = status < 0 ? status : tactus_toml_string(root, "driver", &driver);
+	status = status < 0 ? status : tactus_profile_text(root, "driver", &r->profile->driver);
 	status = status < 0 ? status : tactus_profile_choice(root, "order", orders, &order);
 	status = status < 0 ? status : tactus_profile_integer(root, "first_address", 0, 1, &first);
-	status = status < 0 ? status : read_copy(root, "name", &r->profile->name);
-	status = status < 0 ? status : read_copy(root, "description", &r->profile->description);
+	status = status < 0 ? status : tactus_profile_text(root, "name", &r->profile->name);
+	status = status < 0 ? status : tactus_profile_text(root, "description", &r->profile->description);
 	r->order = (enum tactus_value_order)order;
 	r->first_address = first;
 	return status;
@@ -192,6 +161,12 @@ static int check(const tactus_profile_reader *r, const tactus_toml_node *root)
 	const tactus_profile *p = r->profile;
 	double ohm = NAN;
 	const unsigned missing = p->scan.modes & ~p->modes;
+	if (p->driver != NULL && strcmp(p->driver, "registers") != 0) {
+		const bool more = p->column_count + p->fact_count + p->start_count + p->stop_count > 0 || p->has_counter;
+		return !more ? TACTUS_OK
+					 : tactus_toml_fail(root, "driver", TACTUS_ERR_INPUT,
+										"the driver '%s' knows its registers: a profile says [link] alone", p->driver);
+	}
 	if (p->column_count == 0)
 		return tactus_toml_fail(root, NULL, TACTUS_ERR_INPUT, "the profile reads nothing: it has no [[register]]");
 	for (size_t i = 0; i < p->column_count && p->has_counter; i++)
@@ -221,7 +196,7 @@ static int read_sections(tactus_profile_reader *r, const tactus_toml_node *root)
 	status = status < 0 ? status : read_link(root, p);
 	status = status < 0 ? status : read_scan(root, p);
 	status = status < 0 ? status : read_detectors(root, r);
-	status = status < 0 ? status : read_metadata(root, p);
+	status = status < 0 ? status : tactus_profile_metadata(root, p->metadata);
 	status = status < 0 ? status : read_counter(r, root);
 	status = status < 0 ? status : tactus_profile_facts(r, root);
 	status = status < 0 ? status : tactus_profile_writes(r, root, "start", p->start, &p->start_count);
@@ -283,6 +258,7 @@ void tactus_profile_free(tactus_profile *profile)
 	if (profile == NULL)
 		return;
 	tactus_metadata_free(profile->metadata);
+	free(profile->driver);
 	free(profile->name);
 	free(profile->description);
 	free(profile);

@@ -54,7 +54,7 @@ typedef struct {
 } tactus_profile_fact;
 
 typedef struct {
-	char *name, *description;
+	char *driver, *name, *description;
 	tactus_modbus_options link;
 	int max_gap;
 	struct {

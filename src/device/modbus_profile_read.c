@@ -2,6 +2,7 @@
 #include <ctype.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "core/core.h"
 #include "device/device.h"
@@ -43,6 +44,36 @@ int tactus_profile_keys(const tactus_toml_node *table, const tactus_bench_key *k
 	int status = 0;
 	for (size_t i = 0; i < n && status >= 0; i++)
 		status = tactus_bench_read_key(table, &keys[i], object);
+	return status;
+}
+
+int tactus_profile_text(const tactus_toml_node *table, const char *key, char **text)
+{
+	const char *value = NULL;
+	const int status = tactus_toml_string(table, key, &value);
+	if (status <= 0)
+		return status;
+	free(*text);
+	*text = tactus_strndup(value, strlen(value));
+	return *text != NULL ? 1 : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+}
+
+int tactus_profile_metadata(const tactus_toml_node *root, tactus_metadata *metadata)
+{
+	const tactus_toml_node *table = NULL;
+	int status = tactus_toml_table(root, "metadata", &table);
+	for (size_t i = 0; status > 0 && i < tactus_toml_size(table); i++) {
+		const char *key = tactus_toml_key(table, i), *text = NULL;
+		double number = NAN;
+		if (tactus_toml_is(table, key, 'n')) {
+			status = tactus_toml_number(table, key, &number);
+			status = status < 0 ? status : tactus_metadata_set_number(metadata, key, number);
+		} else {
+			status = tactus_toml_string(table, key, &text);
+			status = status < 0 ? status : tactus_metadata_set(metadata, key, text);
+		}
+		status = status < 0 ? status : 1;
+	}
 	return status;
 }
 

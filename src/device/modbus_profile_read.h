@@ -20,6 +20,10 @@ int tactus_profile_choice(const tactus_toml_node *table, const char *key, const 
 int tactus_profile_integer(const tactus_toml_node *table, const char *key, long long least, long long most, int *value);
 int tactus_profile_keys(const tactus_toml_node *table, const tactus_bench_key *keys, size_t n, void *object);
 
+/* A text, allocated, in place of the one before; [metadata]: any keys, numbers or texts, for the recording. */
+int tactus_profile_text(const tactus_toml_node *table, const char *key, char **text);
+int tactus_profile_metadata(const tactus_toml_node *root, tactus_metadata *metadata);
+
 /* A value: address, table, type, order, bit, scale, offset. */
 int tactus_profile_value(const tactus_profile_reader *reader, const tactus_toml_node *node, tactus_value *value);
 /* [[register]], [[identity]], and [[start]] or [[stop]] by its key: each replaces what the base had. */

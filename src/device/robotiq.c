@@ -15,6 +15,7 @@
 #include "core/core.h"
 #include "device/load_cell.h"
 #include "device/modbus_driver.h"
+#include "device/modbus_profile.h"
 #include "device/robotiq_frames.h"
 
 /* Holding registers; writing STREAM_ON to REGISTER_STREAM starts the stream. */
@@ -122,11 +123,14 @@ static void robotiq_free(robotiq *r)
 static int configure(robotiq *r, tactus_uri *uri, tactus_modbus_options *options)
 {
 	long stream = 1;
-	options->unit = 9;
-	options->parity = 'N';
-	options->timeout_s = 0.2;
-	(void)tactus_uri_text(uri, "profile", NULL);
-	int code = tactus_modbus_options_read(uri, options);
+	tactus_profile *profile = NULL;
+	int code = tactus_profile_open(tactus_uri_text(uri, "profile", "robotiq-ft300"), true, &profile);
+	if (code >= 0) {
+		profile->link.serial = options->serial;
+		*options = profile->link;
+	}
+	tactus_profile_free(profile);
+	code = code < 0 ? code : tactus_modbus_options_read(uri, options);
 	code = code < 0 ? code : tactus_uri_integer(uri, "stream", 0, 1, &stream);
 	code = code < 0 ? code : tactus_load_cell_configure(&r->cell, uri);
 	code = code < 0 ? code : tactus_uri_check(uri);

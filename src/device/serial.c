@@ -46,12 +46,9 @@ enum { NOWHERE = -1, SEQUENCE = -2 };
 
 typedef struct {
 	tactus_port_identity port;
-	int fd, baud;
-	double timeout_s; /* of the URI or the profile; NaN: none */
-	double silence_s; /* of the running scan */
-	tactus_lines lines;
-	bool has_columns;          /* else a header line has to say them */
-	tactus_metadata *metadata; /* that the profile adds */
+	int fd;
+	tactus_lines_profile profile; /* what the URI or a profile says; columns, if neither does, the header line */
+	double silence_s;             /* of the running scan */
 	/* where each field goes: an offset in the reading, NOWHERE or SEQUENCE */
 	long target[TACTUS_LINE_FIELDS_MAX];
 	int channels[CHANNELS_MAX]; /* of a line, in the order of the readings; one channel 0 where there are none */
@@ -68,61 +65,6 @@ typedef struct {
 
 /* ---- open and close ---- */
 
-static int read_metadata(const tactus_toml_node *root, tactus_metadata *metadata)
-{
-	const tactus_toml_node *table = NULL;
-	int code = tactus_toml_table(root, "metadata", &table);
-	for (size_t i = 0; code > 0 && i < tactus_toml_size(table); i++) {
-		const char *key = tactus_toml_key(table, i), *text = NULL;
-		double number = 0;
-		if (tactus_toml_is(table, key, 's')) {
-			code = tactus_toml_string(table, key, &text);
-			code = code < 0 ? code : tactus_metadata_set(metadata, key, text);
-		} else {
-			code = tactus_toml_number(table, key, &number);
-			code = code < 0 ? code : tactus_metadata_set_number(metadata, key, number);
-		}
-		code = code < 0 ? code : 1;
-	}
-	return code;
-}
-
-static int read_profile(serial *s, const char *path)
-{
-	static const char *const texts[] = {"kind", "driver", "name", "description", "columns"};
-	const char *values[TACTUS_COUNT(texts)] = {NULL};
-	tactus_toml *document = NULL;
-	double baud = s->baud, format = 1;
-	int code = tactus_toml_read(path, &document);
-	if (code < 0)
-		return code;
-	const tactus_toml_node *root = tactus_toml_root(document);
-	for (size_t i = 0; i < TACTUS_COUNT(texts) && code >= 0; i++)
-		code = tactus_toml_string(root, texts[i], &values[i]);
-	if (code >= 0 && (values[0] == NULL || strcmp(values[0], "profile") != 0 || values[1] == NULL ||
-					  strcmp(values[1], "lines") != 0))
-		code = tactus_toml_fail(root, NULL, TACTUS_ERR_INPUT,
-								"a profile of lines of text says kind = \"profile\" and driver = \"lines\"");
-	code = code < 0 ? code : tactus_toml_number(root, "format", &format);
-	if (code >= 0 && format != 1)
-		code = tactus_toml_fail(root, "format", TACTUS_ERR_INPUT, "format %g is newer than this program", format);
-	code = code < 0 ? code : tactus_toml_number(root, "baud", &baud);
-	if (code >= 0 && !(baud >= 50 && baud <= 4e6 && baud == floor(baud)))
-		code = tactus_toml_fail(root, "baud", TACTUS_ERR_INPUT, "baud = %g is out of range", baud);
-	s->baud = code < 0 ? s->baud : (int)baud;
-	code = code < 0 ? code : tactus_toml_number(root, "timeout_s", &s->timeout_s);
-	if (code >= 0 && values[4] != NULL) {
-		code = tactus_lines_parse(values[4], &s->lines);
-		if (code < 0)
-			code = tactus_toml_fail(root, "columns", TACTUS_ERR_INPUT, "%s", tactus_error_message());
-		s->has_columns = true;
-	}
-	code = code < 0 ? code : read_metadata(root, s->metadata);
-	code = code < 0 ? code : tactus_toml_check_unknown(document);
-	tactus_toml_free(document);
-	return code < 0 ? code : TACTUS_OK;
-}
-
 /* Options of the URI that a recording says, and conversion needs. */
 static int read_facts(serial *s, tactus_uri *uri)
 {
@@ -134,14 +76,14 @@ static int read_facts(serial *s, tactus_uri *uri)
 		double value = NAN;
 		code = tactus_uri_quantity(uri, facts[i].option, facts[i].unit, &value);
 		if (code >= 0 && !isnan(value))
-			code = tactus_metadata_set_number(s->metadata, facts[i].key, value);
+			code = tactus_metadata_set_number(s->profile.metadata, facts[i].key, value);
 	}
 	const char *drive = tactus_uri_text(uri, "drive", NULL); /* in DC it may be negative */
 	double drive_V;
 	if (code >= 0 && drive != NULL)
 		code = tactus_parse_quantity(drive, "V", &drive_V);
 	if (code >= 0 && drive != NULL)
-		code = tactus_metadata_set_number(s->metadata, "drive_V", drive_V);
+		code = tactus_metadata_set_number(s->profile.metadata, "drive_V", drive_V);
 	return code;
 }
 
@@ -149,13 +91,13 @@ static int configure(serial *s, tactus_uri *uri)
 {
 	const char *profile = tactus_uri_text(uri, "profile", NULL), *columns = tactus_uri_text(uri, "columns", NULL);
 	long baud = 0;
-	int code = profile != NULL ? read_profile(s, profile) : TACTUS_OK;
+	int code = profile != NULL ? tactus_lines_profile_read(profile, &s->profile) : TACTUS_OK;
 	code = code < 0 ? code : tactus_uri_integer(uri, "baud", 50, 4000000, &baud);
-	s->baud = baud > 0 ? (int)baud : s->baud;
-	code = code < 0 ? code : tactus_uri_quantity(uri, "timeout", "s", &s->timeout_s);
+	s->profile.baud = baud > 0 ? (int)baud : s->profile.baud;
+	code = code < 0 ? code : tactus_uri_quantity(uri, "timeout", "s", &s->profile.timeout_s);
 	if (code >= 0 && columns != NULL) {
-		code = tactus_lines_parse(columns, &s->lines);
-		s->has_columns = true;
+		code = tactus_lines_parse(columns, &s->profile.lines);
+		s->profile.has_columns = true;
 	}
 	code = code < 0 ? code : read_facts(s, uri);
 	code = code < 0 ? code : tactus_uri_check(uri);
@@ -168,7 +110,7 @@ static void serial_free(serial *s)
 {
 	if (s->fd >= 0)
 		close(s->fd);
-	tactus_metadata_free(s->metadata);
+	tactus_lines_profile_clear(&s->profile);
 	free(s);
 }
 
@@ -179,14 +121,11 @@ static int serial_open(tactus_device *device, const char *address)
 	if (s == NULL)
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	s->fd = -1;
-	s->baud = 115200;
-	s->timeout_s = NAN;
-	s->metadata = tactus_metadata_new();
-	int code = s->metadata != NULL ? TACTUS_OK : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	int code = tactus_lines_profile_init(&s->profile);
 	code = code < 0 ? code : tactus_uri_parse("serial", address, &uri);
 	code = code < 0 ? code : configure(s, &uri);
 	if (code >= 0)
-		code = s->fd = tactus_port_open(uri.target, s->baud, &s->port);
+		code = s->fd = tactus_port_open(uri.target, s->profile.baud, &s->port);
 	tactus_uri_clear(&uri);
 	if (code < 0) {
 		serial_free(s);
@@ -194,7 +133,7 @@ static int serial_open(tactus_device *device, const char *address)
 	}
 	/* A board that prints a header does so when it restarts, as its first line; any other may be in the middle of one.
 	 */
-	s->skip = s->has_columns;
+	s->skip = s->profile.has_columns;
 	device->state = s;
 	return TACTUS_OK;
 }
@@ -270,7 +209,7 @@ static bool is_empty(const serial *s, size_t length)
  */
 static int wait_header(serial *s, int64_t until_ns)
 {
-	while (!s->has_columns) {
+	while (!s->profile.has_columns) {
 		tactus_lines header;
 		double values[TACTUS_LINE_FIELDS_MAX];
 		size_t length;
@@ -283,9 +222,10 @@ static int wait_header(serial *s, int64_t until_ns)
 							   "serial:%s?columns=force_N,…",
 							   s->port.path, FIRST_LINE_S, s->port.path);
 		if (tactus_lines_header(s->buffer, length, &header))
-			s->lines = header;
+			s->profile.lines = header;
 		else
-			s->has_columns = s->lines.count > 0 && tactus_lines_read(&s->lines, s->buffer, length, values);
+			s->profile.has_columns =
+				s->profile.lines.count > 0 && tactus_lines_read(&s->profile.lines, s->buffer, length, values);
 		drop_line(s, length);
 	}
 	return TACTUS_OK;
@@ -305,7 +245,7 @@ static int find_channel(serial *s, int channel)
 /* An offset in the reading for a column; those with the same name share it. */
 static int find_target(serial *s, tactus_device *device, size_t field)
 {
-	const char *name = s->lines.fields[field].name;
+	const char *name = s->profile.lines.fields[field].name;
 	if (name[0] == '\0' || strcmp(name, "sequence") == 0) {
 		s->target[field] = name[0] == '\0' ? NOWHERE : SEQUENCE;
 		return TACTUS_OK;
@@ -331,8 +271,8 @@ static int find_target(serial *s, tactus_device *device, size_t field)
 
 static bool has(const serial *s, const char *name)
 {
-	for (size_t i = 0; i < s->lines.count; i++)
-		if (strcmp(s->lines.fields[i].name, name) == 0)
+	for (size_t i = 0; i < s->profile.lines.count; i++)
+		if (strcmp(s->profile.lines.fields[i].name, name) == 0)
 			return true;
 	return false;
 }
@@ -341,10 +281,10 @@ static int place_columns(serial *s, tactus_device *device)
 {
 	int code = TACTUS_OK;
 	s->channel_count = 0;
-	for (size_t i = 0; i < s->lines.count && code >= 0; i++) {
+	for (size_t i = 0; i < s->profile.lines.count && code >= 0; i++) {
 		code = find_target(s, device, i);
-		if (code >= 0 && s->lines.fields[i].channel > 0)
-			code = find_channel(s, s->lines.fields[i].channel);
+		if (code >= 0 && s->profile.lines.fields[i].channel > 0)
+			code = find_channel(s, s->profile.lines.fields[i].channel);
 	}
 	device->has_channels = s->channel_count > 0;
 	if (s->channel_count == 0)
@@ -416,8 +356,8 @@ static void quote(const char *line, size_t length, char *text, size_t size)
 static int fail_no_line(const serial *s, const char *last)
 {
 	return tactus_fail(TACTUS_ERR_DEVICE, "%s: no line of %zu numbers came within %d s at %d baud%s%s%s", s->port.path,
-					   s->lines.count, FIRST_LINE_S, s->baud, last[0] != '\0' ? "; the last one was \"" : "", last,
-					   last[0] != '\0' ? "\"" : "");
+					   s->profile.lines.count, FIRST_LINE_S, s->profile.baud,
+					   last[0] != '\0' ? "; the last one was \"" : "", last, last[0] != '\0' ? "\"" : "");
 }
 
 /* Watches lines for a while: that there are some, of so many numbers, and how regularly they come. */
@@ -438,7 +378,7 @@ static int warm_up(serial *s, tactus_device *device)
 		if (code == 0)
 			return fail_no_line(s, last);
 		now_ns = tactus_clock_ns();
-		if (tactus_lines_read(&s->lines, s->buffer, length, values)) {
+		if (tactus_lines_read(&s->profile.lines, s->buffer, length, values)) {
 			if (n++ > 0)
 				tactus_timing_add(&device->intervals, 1e-9 * (double)(now_ns - before_ns));
 			before_ns = now_ns;
@@ -461,8 +401,9 @@ static int set_metadata(const serial *s, tactus_device *device)
 	code = code < 0 ? code : tactus_metadata_set(m, "device", identity);
 	const double interval_s = device->intervals.mean_s;
 	code = code < 0 ? code : tactus_metadata_set_number(m, "rate_Hz", interval_s > 0 ? 1 / interval_s : NAN);
-	for (size_t i = 0; i < tactus_metadata_count(s->metadata) && code >= 0; i++)
-		code = tactus_metadata_set(m, tactus_metadata_key(s->metadata, i), tactus_metadata_value(s->metadata, i));
+	for (size_t i = 0; i < tactus_metadata_count(s->profile.metadata) && code >= 0; i++)
+		code = tactus_metadata_set(m, tactus_metadata_key(s->profile.metadata, i),
+								   tactus_metadata_value(s->profile.metadata, i));
 	return code;
 }
 
@@ -477,7 +418,9 @@ static int serial_start(tactus_device *device, const tactus_scan_settings *setti
 	code = code < 0 ? code : set_metadata(s, device);
 	s->held = s->given = 0;
 	s->first_number = NAN;
-	s->silence_s = settings->timeout_s > 0 ? settings->timeout_s : s->timeout_s > 0 ? s->timeout_s : SILENCE_S;
+	s->silence_s = settings->timeout_s > 0    ? settings->timeout_s
+				   : s->profile.timeout_s > 0 ? s->profile.timeout_s
+											  : SILENCE_S;
 	const double rate_Hz = device->intervals.mean_s > 0 ? 1 / device->intervals.mean_s : 0;
 	device->expected_scans = tactus_live_expected(rate_Hz, settings);
 	if (code >= 0)
@@ -501,7 +444,7 @@ static uint64_t number_line(serial *s, tactus_live *live, double counted)
 static void put_line(serial *s, tactus_device *device, const double *values, double time_s)
 {
 	double counted = NAN;
-	for (size_t i = 0; i < s->lines.count; i++)
+	for (size_t i = 0; i < s->profile.lines.count; i++)
 		if (s->target[i] == SEQUENCE)
 			counted = values[i];
 	const uint64_t sequence = number_line(s, &device->live, counted);
@@ -514,8 +457,8 @@ static void put_line(serial *s, tactus_device *device, const double *values, dou
 		reading->sequence = sequence;
 		reading->channel = s->channels[k];
 		reading->mode = s->is_ac ? TACTUS_MODE_AC : TACTUS_MODE_DC;
-		for (size_t i = 0; i < s->lines.count; i++) {
-			const int channel = s->lines.fields[i].channel;
+		for (size_t i = 0; i < s->profile.lines.count; i++) {
+			const int channel = s->profile.lines.fields[i].channel;
 			if (s->target[i] < 0 || (channel != 0 && channel != s->channels[k]))
 				continue;
 			memcpy((char *)reading + s->target[i], &values[i], sizeof(double));
@@ -547,7 +490,7 @@ static int take_line(serial *s, tactus_device *device)
 		}
 		const double time_s = tactus_live_now_s(&device->live);
 		const bool empty = is_empty(s, length),
-				   good = !empty && tactus_lines_read(&s->lines, s->buffer, length, values);
+				   good = !empty && tactus_lines_read(&s->profile.lines, s->buffer, length, values);
 		drop_line(s, length);
 		if (good) {
 			put_line(s, device, values, time_s);
@@ -580,7 +523,7 @@ static int serial_reopen(tactus_device *device)
 	serial *s = device->state;
 	if (s->fd >= 0)
 		close(s->fd);
-	s->fd = tactus_port_reopen(&s->port, s->baud);
+	s->fd = tactus_port_reopen(&s->port, s->profile.baud);
 	s->length = 0;
 	s->skip = true;
 	s->first_number = NAN; /* a board that was off counts from the beginning */

@@ -229,6 +229,31 @@ plain_model() {
 	prints "creep"
 }
 
+@test "show a profile of a device: its driver, what is written, which register every column is; built in, and files" {
+	tactus show "$examples/profile-plant.toml" --json >show.json
+	[ "$(jq -r '[.kind, .profile.driver, .profile.requests_per_scan] | join(" ")' show.json)" = "profile registers 4" ]
+	[ "$(jq -r .columns.displacement_um show.json)" = "holding 20 f32 CDAB" ]
+	[ "$(jq -r .columns.pressure_Pa show.json)" = "input 7 u16 * 0.5 - 1" ]
+	[ "$(jq -r .profile.start show.json)" = "holding 30 f32 = -1; holding 39 u16 = 7" ]
+	run --separate-stderr tactus show tactus-board
+	status_is 0
+	prints "tactus-board: profile of a device, driver registers"
+	prints "channel 8 input 156 f32"
+	[ "$(tactus show robotiq-ft300 --json | jq -r .profile.unit)" = 9 ]
+	printf 'kind = "profile"\ndriver = "lines"\ncolumns = "force_N*0.5,-,conductance_S@1/1e6"\n' >board.toml
+	[ "$(tactus show board.toml --json | jq -r .columns.conductance_S)" = "channel 1 field 3 * 1e-06" ]
+	run --separate-stderr tactus show labjack-t7
+	status_is 0
+	prints "labjack-t7: bench, profile of labjack-t7"
+	prints "switch_active          low"
+	printf 'kind = "profile"\ndriver = "registers"\n[link]\nunits = 3\n' >bad.toml
+	run --separate-stderr tactus show bad.toml
+	status_is 3
+	says "bad.toml:4:1: "
+	run --separate-stderr tactus show no-such-profile
+	status_is 3
+}
+
 @test "show --effects: all 29 effects by name, one in full, an unknown one refused" {
 	tactus show --effects --json >effects.json
 	[ "$(jq '[.effects[] | select(.domain == "sensor")] | length' effects.json)" -eq 16 ]

@@ -169,6 +169,8 @@ static void test_what_is_wrong_in_a_profile_is_said_with_its_place(void **state)
 		{ONE "[counter]\naddress = 3\ntype = \"f32\"\n", "u16 or u32"},
 		{ONE "every = 0\n", "from 1 to 1000000"},
 		{ONE "every = 3\n[counter]\naddress = 3\n", "read whole"},
+		{"kind = \"profile\"\nbase = \"robotiq-ft300\"\n[link]\nunit = 10\n", NULL},
+		{"kind = \"profile\"\nbase = \"robotiq-ft300\"\n[[stop]]\naddress = 1\nvalue = 1\n", "[link] alone"},
 		{ONE "[link]\nunit = 256\n", "from 0 to 255"},
 		{ONE "[link]\ntimeout_s = 0\n", "out of range"},
 		{ONE "[scan]\nmodes = [\"xy\"]\n", "\"dc\" or \"ac\""},
