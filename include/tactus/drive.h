@@ -13,9 +13,15 @@ extern "C" {
 #endif
 
 /*
- * One drive so far: OpenFFBoard, `hid:1209:ffb0[:SERIAL][?timeout=500ms]`, firmware 1.15 to 1.x, its first axis. What
- * is written to it was taken from its public firmware; NOTHING WAS TRIED ON HARDWARE. Before a motor is connected read
- * tactus_drive_describe(), begin with a small torque_limit_share, and keep the board's emergency stop in reach.
+ * One drive so far: OpenFFBoard, `hid:1209:ffb0[:SERIAL][?timeout=500ms]`, firmware 1.15 to 1.x, of a board with two
+ * axes the first (X): the second gets no torque and its position is not read. What is written to it was taken from its
+ * public firmware; NOTHING WAS TRIED ON HARDWARE. Before a motor is connected read tactus_drive_describe(), begin with
+ * a small torque_limit_share, and keep the board's emergency stop in reach.
+ *
+ * A drive that is lost (unplugged, silent) stays lost. Unlike a sensor it is never found again by itself: nobody knows
+ * where the axis went meanwhile, and a motor must not begin to turn because somebody put a plug in. From then on every
+ * call but tactus_drive_stop() and tactus_drive_close() returns TACTUS_ERR_LOST and writes nothing; close it, and open
+ * and start it anew once a person has seen to it. The board itself stops the motor when the cable is pulled.
  *
  * Threads: one drive belongs to one thread at a time; different drives are independent.
  */

@@ -62,8 +62,15 @@ const tactus_metadata *tactus_drive_describe(const tactus_drive *drive)
 	return drive->facts;
 }
 
+static int fail_lost(void)
+{
+	return tactus_fail(TACTUS_ERR_LOST, "the drive was lost and stays off: close it, and open it anew");
+}
+
 int tactus_drive_position(tactus_drive *drive, double *position_rad)
 {
+	if (drive->lost)
+		return fail_lost();
 	if (drive->running)
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "while the drive runs, tactus_drive_step() says the position");
 	return drive->backend->position(drive, position_rad);
@@ -100,6 +107,7 @@ static int switch_off(tactus_drive *drive, int code)
 {
 	char *message = tactus_strndup(tactus_error_message(), strlen(tactus_error_message()));
 	drive->running = false;
+	drive->lost = drive->lost || code == TACTUS_ERR_LOST;
 	drive->backend->stop(drive);
 	if (message != NULL)
 		tactus_fail(code, "%s", message);
@@ -110,7 +118,7 @@ static int switch_off(tactus_drive *drive, int code)
 int tactus_drive_start(tactus_drive *drive, const tactus_drive_settings *asked)
 {
 	tactus_drive_settings settings;
-	int code = settle(asked, &settings);
+	int code = drive->lost ? fail_lost() : settle(asked, &settings);
 	if (code >= 0)
 		code = tactus_drive_stop(drive);
 	if (code < 0)
@@ -127,7 +135,7 @@ int tactus_drive_step(tactus_drive *drive, double torque_Nm, tactus_drive_state 
 {
 	const double limit_Nm = drive->settings.torque_limit_share * drive->settings.full_torque_Nm;
 	if (!drive->running)
-		return tactus_fail(TACTUS_ERR_ARGUMENT, "the drive was not started");
+		return drive->lost ? fail_lost() : tactus_fail(TACTUS_ERR_ARGUMENT, "the drive was not started");
 	if (!isfinite(torque_Nm))
 		return switch_off(drive, tactus_fail(TACTUS_ERR_RANGE, "the torque is %g: the motor is off", torque_Nm));
 	drive->now.limited = fabs(torque_Nm) > limit_Nm;
@@ -144,5 +152,7 @@ int tactus_drive_stop(tactus_drive *drive)
 	if (!drive->running)
 		return TACTUS_OK;
 	drive->running = false;
-	return drive->backend->stop(drive);
+	const int code = drive->backend->stop(drive);
+	drive->lost = drive->lost || code == TACTUS_ERR_LOST;
+	return code;
 }

@@ -36,6 +36,7 @@ struct tactus_drive {
 	int64_t (*clock_ns)(void); /* tactus_clock_ns; tests put their own here */
 	int64_t started_ns;
 	bool running;
+	bool lost; /* for good: a motor that is plugged in again must not turn by itself */
 };
 
 extern const tactus_drive_backend tactus_drive_openffboard;
