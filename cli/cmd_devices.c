@@ -39,8 +39,11 @@ const struct cli_command cli_devices = {
 	.name = "devices",
 	.summary = "list what can be scanned, with URIs",
 	.arguments = "",
-	.description = "Lists the URIs that `tactus scan` can open now. Simulated benches are always there; a bench of "
-				   "your own is sim:FILE.toml, a recording that is played back replay:FILE.",
+	.description =
+		"Lists the URIs that `tactus scan` can open now. Simulated benches are always there; a bench of "
+		"your own is sim:FILE.toml, a recording that is played back replay:FILE. Of serial ports it is not known what "
+		"hangs on them; devices on the network are not looked for. tactus-devices(7) has their URIs, and says "
+		"what was tried on hardware: nothing yet.",
 	.examples = "tactus devices         # one line for each\n"
 				"tactus devices --json  # for programs\n",
 	.options = options,

@@ -33,6 +33,10 @@ TACTUS_API double tactus_protocol_maximum_N(const tactus_protocol *protocol);
 
 /* ---- devices ---- */
 
+/*
+ * tactus-devices(7) lists the real ones. NONE OF THEM WAS TRIED ON HARDWARE YET: their drivers follow public
+ * descriptions and are tested against independent peers, emulated devices and a real USB stack.
+ */
 typedef struct tactus_device tactus_device;
 
 enum tactus_mode { TACTUS_MODE_DC = 1, TACTUS_MODE_AC = 2 };

@@ -1,4 +1,7 @@
-/* Emulated devices: the protocols of real ones, served from the simulated bench, to develop without hardware. */
+/*
+ * Emulated devices: the protocols of real ones, served from the simulated bench, to develop without hardware. They were
+ * written from the same public documents as the drivers; no hardware was there to compare.
+ */
 #ifndef TACTUS_EMULATE_H
 #define TACTUS_EMULATE_H
 

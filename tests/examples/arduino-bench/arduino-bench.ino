@@ -5,6 +5,7 @@
  * outputs are on A0 and A1. The output is DRIVE * RG * G volts, of which the ADC makes 1023 / REFERENCE counts each:
  * G = counts / (1023 / REFERENCE * DRIVE * RG). The header line says so, and tactus does the rest. Without op-amps, a
  * divider will do to begin with: print the counts as they are and calibrate those (`tactus fit --output adc_count`).
+ * It was run by tests on a computer, not tried on a board yet.
  */
 const float REFERENCE = 5.0;     /* volts of the ADC's full scale */
 const float DRIVE = 1.0;         /* volts across the sensor */
