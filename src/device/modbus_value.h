@@ -25,9 +25,9 @@ typedef struct {
 	int address;
 	enum tactus_value_type type;
 	enum tactus_value_order order;
-	int bit; /* of its register, from the lowest */
-	double scale, offset;
+	int bit;   /* of its register, from the lowest */
 	int every; /* of a poll: it is read in every so-manieth; 0 and 1: in each */
+	double scale, offset;
 } tactus_value;
 
 /* Registers (or bits, for coils and discrete inputs) that it takes up. */
