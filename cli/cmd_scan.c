@@ -86,6 +86,16 @@ static int max_lost(const struct cli *cli, double *share)
 	return 0;
 }
 
+/* A time-out of nothing or less would be no time-out, or one that nothing can meet. */
+static int check_waits(const struct cli *cli)
+{
+	if (!(cli_quantity(cli, "timeout", 1) > 0))
+		return cli_error(cli, CLI_USAGE, "--timeout: must be above zero");
+	if (!(cli_quantity(cli, "reconnect-timeout", RECONNECT_S) >= 0))
+		return cli_error(cli, CLI_USAGE, "--reconnect-timeout: must not be negative");
+	return 0;
+}
+
 /* ---- continuing a recording ---- */
 
 /* The end of the recording that is there: the next scan begins on the next tick of its rate. */
@@ -432,6 +442,8 @@ static int run(struct cli *cli)
 	int status = check_usage(cli);
 	if (!status)
 		status = max_lost(cli, &share);
+	if (!status)
+		status = check_waits(cli);
 	if (!status)
 		status = cli_channels(cli, "channels", &channels, &channel_count);
 	if (status)
