@@ -177,7 +177,7 @@ static int describe_lines(const char *path, tactus_metadata *facts, tactus_metad
 	for (size_t i = 0; i < TACTUS_COUNT(texts) && code >= 0; i++)
 		code = texts[i][1] != NULL ? tactus_metadata_set(facts, texts[i][0], texts[i][1]) : code;
 	code = code < 0 ? code : tactus_metadata_set_number(facts, "baud", p.baud);
-	for (size_t i = 0; i < tactus_metadata_count(p.metadata) && code >= 0; i++)
+	for (size_t i = 0; code >= 0 && i < tactus_metadata_count(p.metadata); i++)
 		code = tactus_metadata_set(facts, tactus_metadata_key(p.metadata, i), tactus_metadata_value(p.metadata, i));
 	for (size_t i = 0; i < p.lines.count && code >= 0; i++) {
 		const tactus_line_field *f = &p.lines.fields[i];
