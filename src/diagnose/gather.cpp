@@ -69,7 +69,8 @@ bool restates_output(const tactus_table *table, const char *name, const tactus_s
 		for (size_t i = 0; i < series.n; i++)
 			if (std::isfinite(values[series.row[i]]) && std::isfinite(series.signal[s][i]))
 				pairs.emplace_back(values[series.row[i]], series.signal[s][i]);
-		std::sort(pairs.begin(), pairs.end());
+		/* Equal values stay as they came: the order of the outputs among them must not decide. */
+		std::stable_sort(pairs.begin(), pairs.end(), [](const auto &a, const auto &b) { return a.first < b.first; });
 		size_t up = 0, down = 0;
 		for (size_t i = 1; i < pairs.size(); i++)
 			if (pairs[i].first > pairs[i - 1].first) {
