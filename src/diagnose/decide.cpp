@@ -520,7 +520,7 @@ void Decider::adequacy()
 	/* What causes explain must be most of what can be explained at all. */
 	double most = 0;
 	for (const Dependence &dep : d.left)
-		most = std::fmax(most, dep.whitened * d.final.square);
+		most = std::fmax(most, dep.removed);
 	if (most > 0 && d.base.square - d.final.square < limits.half * (d.base.square - d.final.square + most)) {
 		d.causes.clear();
 		d.final = d.base;

@@ -38,13 +38,24 @@ MatrixXd masked(const Problem &problem, const MatrixXd &jacobian, const MatrixXd
 namespace
 {
 
-/* Held-out squares of a regression of r on columns, folds of blocks left out in turn, against those of r alone. */
-double held_out_share(const Problem &problem, const MatrixXd &columns, const VectorXd &r)
+/* Squares of r, of the output where a share of them is removed that is largest. */
+struct HeldOut {
+	double share = 0, removed = 0;
+};
+
+/*
+ * Held-out squares of a regression of r on columns, folds of blocks left out in turn, against those of r alone; output
+ * by output: what one of them cannot foretell of its own larger misfit says nothing of the other.
+ */
+HeldOut held_out(const Problem &problem, const MatrixXd &columns, const VectorXd &r)
 {
 	const Index q = columns.cols();
 	MatrixXd gram[8];
 	VectorXd product[8];
 	std::vector<Index> member[8];
+	std::vector<size_t> output(size_t(problem.rows()), 0);
+	for (const Run &run : problem.runs)
+		std::fill_n(output.begin() + run.first, run.count, run.output);
 	for (Index i = 0; i < problem.rows(); i++)
 		if (problem.trains(i, Rows::train))
 			member[size_t(problem.fold[size_t(problem.block[size_t(i)])])].push_back(i);
@@ -62,7 +73,7 @@ double held_out_share(const Problem &problem, const MatrixXd &columns, const Vec
 		all += gram[f];
 		right += product[f];
 	}
-	double before = 0, after = 0;
+	double before[TACTUS_OUTPUTS_MAX] = {}, after[TACTUS_OUTPUTS_MAX] = {};
 	for (int f = 0; f < 8; f++) {
 		if (member[f].empty())
 			continue;
@@ -70,18 +81,22 @@ double held_out_share(const Problem &problem, const MatrixXd &columns, const Vec
 		left.diagonal().array() += 1e-4; /* columns have length 1: a slight ridge keeps empty bins at 0 */
 		const VectorXd b = left.ldlt().solve(right - product[f]);
 		for (const Index i : member[f]) {
-			before += r[i] * r[i];
-			after += std::pow(r[i] - columns.row(i).dot(b), 2);
+			before[output[size_t(i)]] += r[i] * r[i];
+			after[output[size_t(i)]] += std::pow(r[i] - columns.row(i).dot(b), 2);
 		}
 	}
-	return before > 0 ? 1 - after / before : 0;
+	HeldOut best;
+	for (size_t o = 0; o < problem.output_count; o++)
+		if (before[o] > 0 && 1 - after[o] / before[o] > best.share)
+			best = {1 - after[o] / before[o], before[o] - after[o]};
+	return best;
 }
 
 } // namespace
 
 Dependence dependence(const Problem &problem, const Fit &fit, const Group &group)
 {
-	Dependence result{&group, 0, 0, 1};
+	Dependence result{&group, 0, 0, 0, 1};
 	VectorXd r = fit.residual;
 	problem.mask(r, Rows::train);
 	const MatrixXd columns = masked(problem, fit.jacobian, group.columns, true);
@@ -96,15 +111,17 @@ Dependence dependence(const Problem &problem, const Fit &fit, const Group &group
 		}
 	const double square = r.squaredNorm(), own = k - double(fit.jacobian.cols());
 	result.p_value = f_test(gain, square - gain, std::fmax(own, 1), double(problem.training) - k);
-	if (result.p_value < limits.structure_p)
-		result.whitened = held_out_share(problem, columns, r);
+	if (result.p_value < limits.structure_p) {
+		const HeldOut h = held_out(problem, columns, r);
+		result.whitened = h.share;
+		result.removed = h.removed;
+	}
 	return result;
 }
 
 double explained_share(const Problem &problem, const VectorXd &raw, const Group &group)
 {
-	return std::clamp(held_out_share(problem, masked(problem, MatrixXd(raw.size(), 0), group.columns, false), raw), 0.0,
-					  1.0);
+	return held_out(problem, masked(problem, MatrixXd(raw.size(), 0), group.columns, false), raw).share;
 }
 
 } // namespace tactus::explain

@@ -10,8 +10,9 @@ namespace tactus::explain
 
 struct Dependence {
 	const Group *group;
-	double explained; /* of the residual's variance, held out */
-	double whitened;  /* of the whitened squares, held out */
+	double explained; /* of the residual's variance, held out, in the output where that is most */
+	double whitened;  /* of the whitened squares, likewise */
+	double removed;   /* those squares */
 	double p_value;
 };
 
