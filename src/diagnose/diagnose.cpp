@@ -2,9 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <ctime>
-
-#include <tactus/version.h>
 
 #include "core/core.h"
 #include "device/uri.h"
@@ -12,6 +9,7 @@
 #include "diagnose/limits.hpp"
 #include "diagnose/noise.hpp"
 #include "fit/fit_work.h"
+#include "model/provenance.h"
 
 namespace tactus::explain
 {
@@ -313,22 +311,20 @@ int Diagnosis::extended()
 	for (const Work &work : works)
 		if (work.full.ok)
 			explain::extend(work, effects, model);
-	tactus_metadata *to = model->provenance, *from = tactus_table_metadata(recordings.front().table);
 	std::string files;
+	std::vector<tactus_series> all; /* views: what was recorded in all of them */
 	for (const Recording &r : recordings) {
 		const std::string path = tactus_table_file(r.table);
 		files +=
 			(files.empty() ? "" : ", ") + path.substr(path.rfind('/') == std::string::npos ? 0 : path.rfind('/') + 1);
+		all.insert(all.end(), r.series, r.series + r.count);
 	}
-	char date[32], print[17];
-	const time_t now = time(nullptr);
-	struct tm utc;
-	strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &utc));
-	const char *start = tactus_metadata_get(from, "start");
-	tactus_metadata_set(to, "model", "diagnose");
+	const int status = tactus_note_provenance(recordings.front().table, all.data(), all.size(), "diagnose", model);
+	if (status != TACTUS_OK)
+		return status;
+	tactus_metadata *to = model->provenance;
+	char print[17];
 	tactus_metadata_set(to, "recording", files.c_str());
-	tactus_metadata_set(to, "date", start ? start : date);
-	tactus_metadata_set(to, "version", TACTUS_VERSION);
 	tactus_metadata_set(to, "verdict", tactus_verdict_name(store->diagnosis.verdict));
 	tactus_metadata_set(to, "finding", store->diagnosis.summary);
 	if (options.model) {
@@ -340,6 +336,9 @@ int Diagnosis::extended()
 			const std::string suffix = store->series.size() > 1 ? "_" + std::to_string(s.channel) : "";
 			tactus_metadata_set_number(to, ("held_out_rmse_before" + suffix).c_str(), s.gain->rmse_before);
 			tactus_metadata_set_number(to, ("held_out_rmse_after" + suffix).c_str(), s.gain->rmse_after);
+			for (size_t c = 0; c < model->channel_count; c++)
+				if (model->channels[c].channel == (s.channel ? s.channel : 1))
+					model->channels[c].cv_rmse_N = s.gain->force_rmse_after_N; /* of blocks that no choice has seen */
 		}
 	return TACTUS_OK;
 }

@@ -184,6 +184,13 @@ survives() {
 	tactus diagnose "$creep" --json --extended better.toml >result.json
 	[ "$(jq -r .extended_model result.json)" = better.toml ]
 	[ "$(tactus diagnose "$creep" --json | jq .extended_model)" = null ]
+	# Where it came from is said as `fit` says it; the error in newtons is that on unseen data.
+	tactus fit "$creep" -o fitted.toml >/dev/null
+	for what in '"recording_fingerprint"' '"device"' temperature_degC drive_V; do
+		grep "^$what = " fitted.toml
+		[ "$(grep "^$what = " fitted.toml)" = "$(grep "^$what = " better.toml)" ]
+	done
+	grep "^cv_rmse_N = $(jq .series[0].gain.force_rmse_after_N result.json | cut -c1-10)" better.toml
 	tactus show better.toml --json | jq -e '.effects | index("creep") != null'
 	tactus force -m better.toml "$creep" >newtons.csv
 	tactus simulate -m better.toml "$creep" >simulated.csv
