@@ -119,14 +119,15 @@ Fit join(const Problem &problem, const Fit &fit, const Part &part)
  * No form of the catalogue is exact: what a parameter buys must be worth a share of all that the effect explains, or a
  * flexible wrong cause (a staircase of steps) would beat a plain right one (a trend).
  */
-static double earned(const Fit &with, const Fit &without)
+static double earned(double parameters)
 {
-	return std::fmax(1 - limits.parameter_share * (with.parameters - without.parameters), 0.1);
+	return std::fmax(1 - limits.parameter_share * parameters, 0.1);
 }
 
+/* An instant is one parameter of a form, though as dear to find as three. */
 double merit(const Fit &with, const Fit &without)
 {
-	return (with.cost - without.cost) * earned(with, without);
+	return (with.cost - without.cost) * earned(double(with.slots.size()) - double(without.slots.size()));
 }
 
 namespace
@@ -232,16 +233,19 @@ bool Decider::stands(const Fit &with, const Fit &without) const
 	/* In one output at least it must be worth its while, beside what is left there and what the others removed. */
 	double share = 0;
 	for (size_t o = 0; o < problem.output_count; o++) {
-		const double before = without.square_of[o], gain = (before - with.square_of[o]) * earned(with, without);
+		const double before = without.square_of[o],
+					 gain = (before - with.square_of[o]) * earned(with.parameters - without.parameters);
 		const bool much = gain > limits.further_share * (d.base.square_of[o] - before + gain);
 		const bool rest = gain > limits.completing * (before - double(problem.training_of[o])) &&
 						  gain > limits.completing_share * before;
 		if (much || rest)
 			share = std::fmax(share, gain / before);
 	}
-	return with.ok && without.cost - with.cost > limits.evidence && share > limits.share &&
-		   ((jumps && without.cost - with.cost > limits.jump && share > limits.jump_share) ||
-			paired(problem, problem.held_out(without), problem.held_out(with)) > limits.paired);
+	if (!with.ok || !(without.cost - with.cost > limits.evidence) || !(share > limits.share))
+		return false;
+	const bool plain = jumps && without.cost - with.cost > limits.jump && share > limits.jump_share;
+	return paired(problem, problem.held_out(without), problem.held_out(with)) >
+		   (plain ? limits.jump_paired : limits.paired);
 }
 
 Fit Decider::without(const Fit &fit, const tactus_effect *effect) const

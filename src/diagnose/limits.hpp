@@ -10,7 +10,8 @@ namespace tactus::explain
 /* Every threshold of the decision, with what it is of. BLIND.md says what they cost and gain. */
 struct Limits {
 	double evidence = 16;               /* fall of Schwarz's criterion that a cause must bring (e^8 : 1) */
-	double jump = 60, jump_share = 0.1; /* for instants, where held-out blocks cannot say */
+	double jump = 60, jump_share = 0.1; /* for instants, where held-out blocks say less: the one that holds it cannot */
+	double jump_paired = 1;             /* and what they must say at least, as below */
 	double share = 0.05;                /* of the whitened squares that a cause must remove */
 	double further_share = 0.10;        /* and a further one, of all that was removed */
 	double completing = 0.7;            /* or of what is left above the noise, where that is little … */
