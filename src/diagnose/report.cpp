@@ -325,7 +325,8 @@ void spectra(Store &store, const tactus_trace &trace, bool clock, tactus_diagnos
 							   store.keep(correlation(after))};
 }
 
-const tactus_dependence *unexplained(Store &store, const Work &work, size_t *count)
+const tactus_dependence *unexplained(Store &store, const Work &work, const std::vector<double> &low,
+									 const std::vector<double> &high, size_t *count)
 {
 	const Decision &d = work.decision;
 	std::vector<tactus_dependence> result;
@@ -343,6 +344,13 @@ const tactus_dependence *unexplained(Store &store, const Work &work, size_t *cou
 			 store.format("what is left comes in bursts: a fiftieth of the readings holds %.0f %% of it, more "
 						  "than noise would",
 						  100 * d.bursts)});
+	for (size_t i = 0; i < low.size() && i < d.causes.size(); i++)
+		if (low[i] < 0)
+			result.push_back(
+				{"time_s", 0, 0,
+				 store.format("on stretches that no choice has seen %s may help or harm (95 %%: %.0f %% to "
+							  "%.0f %%): something that was not recorded can look like it",
+							  d.causes[i].effect->name, 100 * low[i], 100 * high[i])});
 	*count = result.size();
 	return store.keep(std::move(result));
 }
@@ -422,8 +430,9 @@ tactus_diagnosed report(Store &store, const Work &work, const char *device, uint
 	std::vector<double> gain, low, high;
 	s.gain = measure_gain(store, work, seed, &gain, &low, &high);
 	s.causes = causes_of(store, work, gain, low, high, &s.cause_count);
-	s.structure_remains = d.structure && !d.causes.empty();
-	s.unexplained = unexplained(store, work, &s.unexplained_count);
+	const bool harm = std::any_of(low.begin(), low.end(), [](double l) { return l < 0; });
+	s.structure_remains = !d.causes.empty() && (d.structure || harm);
+	s.unexplained = unexplained(store, work, low, high, &s.unexplained_count);
 	s.candidates = candidates_of(store, work, &s.candidate_count);
 	s.experiment = propose(store, work, device);
 	s.traces = traces_of(store, work, &s.trace_count);
