@@ -53,7 +53,8 @@ static void cards(const struct html *html, const tactus_diagnosed *series)
 	if (base) {
 		snprintf(label, sizeof label, "off, in %s", cli_quantity_name(base->output, name));
 		card(html, cli_si(base->rmse, base->unit, 2, text), label);
-		card(html, cli_of_noise(base, text), "the noise floor");
+		cli_of_noise(base, text);
+		card(html, text, strchr(text, '%') ? "of the noise floor" : "the noise floor");
 	}
 	if (gain && isfinite(gain->force_rmse_after_N))
 		card(html, cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", 2, text),

@@ -130,8 +130,9 @@ static void say_measured(const struct page *page, const tactus_diagnosed *series
 	words_add(&words, ")");
 	for (size_t i = 0; i < series->base_count; i++) {
 		const tactus_base_error *base = &series->base[i];
-		words_add(&words, "; %s off by %s rms, %s the noise floor", cli_quantity_name(base->output, quantity),
-				  cli_si(base->rmse, base->unit, 2, rmse), cli_of_noise(base, share));
+		cli_of_noise(base, share);
+		words_add(&words, "; %s off by %s rms, %s%s the noise floor", cli_quantity_name(base->output, quantity),
+				  cli_si(base->rmse, base->unit, 2, rmse), share, strchr(share, '%') ? " of" : "");
 		if (fabs(base->refit_rmse - base->rmse) > 0.02 * base->rmse)
 			words_add(&words, " (%s after a refit)", cli_si_like(base->refit_rmse, base->rmse, base->unit, 2, refit));
 	}
