@@ -513,6 +513,14 @@ made() {
 	done
 }
 
+@test "a cause that may harm stretches no choice has seen leaves structure, and is said to" {
+	made 'if (i >= 590 && i < 650) g = g * 1.12 + 6e-7; g += 5e-7 * (rand() + rand() + rand() - 1.5)' 1000 >moved.csv
+	tactus diagnose moved.csv --json >said.json
+	jq -e '[.series[0].causes[].effect] == ["step-change"]' said.json
+	jq -e 'any(.series[0].causes[]; .evidence.held_out_gain_ci95[0] < 0)' said.json
+	jq -e '.series[0] | .structure_remains and any(.unexplained[].text; test("may help or harm"))' said.json
+}
+
 @test "colour on a terminal, but not with NO_COLOR" {
 	type script >/dev/null || skip "script(1) is not installed"
 	TERM=xterm script -qec "tactus diagnose $creep" /dev/null >on
