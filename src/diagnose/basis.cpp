@@ -243,6 +243,19 @@ std::vector<Group> groups_of(const Problem &problem, const std::vector<Extra> &e
 	}
 	if (ordered && inputs > 1)
 		collect.add("row order", "level", row_before(problem), row_before(problem));
+	/* What was put together anew between recordings: nobody wrote a column of it. */
+	const Index recordings = Index(problem.segments.size());
+	if (recordings > 1 && recordings <= 40) {
+		VectorXd number(problem.rows());
+		MatrixXd own = MatrixXd::Zero(problem.rows(), recordings - 1);
+		for (const Run &run : problem.runs) {
+			number.segment(run.first, run.count).setConstant(double(run.segment) + 1);
+			if (run.segment > 0)
+				own.col(Index(run.segment) - 1).segment(run.first, run.count).setOnes();
+		}
+		collect.add("recording", "level of each", own, number);
+		collect.add("recording", "sensitivity of each", times(own, gain), number);
+	}
 	for (const Extra &extra : extras) {
 		VectorXd v(problem.rows());
 		for (const Run &run : problem.runs)

@@ -154,8 +154,18 @@ const tactus_dependence *describe(Store &store, const Work &work, const std::vec
 			text = store.format("%s differs between rising and falling %s", what, on);
 		} else if (group.aspect == "sensitivity") {
 			text = store.format("the sensitivity of %s changes with %s", what, on);
+		} else if (group.aspect == "sensitivity of each") {
+			text = store.format("the sensitivity of %s is another in every recording", what);
 		} else if (shown.mean.size() < 2) {
 			text = store.format("%s depends on %s", what, on);
+		} else if (group.aspect == "level of each") {
+			const auto [low, high] = std::minmax_element(shown.mean.begin(), shown.mean.end());
+			auto place = [&](auto extreme) {
+				return quantity(*extreme * problem.scale[output], work.output_unit[output]) + " in the " +
+					   std::to_string(int(std::lround(shown.at[size_t(extreme - shown.mean.begin())]))) + ". recording";
+			};
+			text = store.format("the residual of %s is another in every recording: %s, %s", what, place(low).c_str(),
+								place(high).c_str());
 		} else {
 			const auto [low, high] = std::minmax_element(shown.mean.begin(), shown.mean.end());
 			const std::string unit = work.output_unit[output], unit_of_it = unit_in_name(name);
@@ -168,7 +178,9 @@ const tactus_dependence *describe(Store &store, const Work &work, const std::vec
 			text = store.format("the residual of %s %s %s: %s, %s", what, shape_of(shown), on, place(low).c_str(),
 								place(high).c_str());
 		}
-		if (group.unknown)
+		if (name == "recording")
+			text = store.format("%s: something changed between them that no column records", text);
+		else if (group.unknown)
 			text = store.format("%s (a column that no cause of the catalogue knows)", text);
 		else if (problem.segments.size() > 1 && name == "time_s")
 			text = store.format("%s, at the same times in every recording: an unrecorded cause", text);

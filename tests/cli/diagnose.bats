@@ -178,6 +178,16 @@ survives() {
 	jq -e --arg a "$creep" '.recordings == [$a, "more.csv"]' result.json
 }
 
+@test "an offset of each recording that no column holds is an unrecorded cause" {
+	for k in 1 2 3 4; do made "g += $k * $k % 7 * 3e-7 - 1e-6 + 1e-8 * (rand() - 0.5)" 400 | cut -d, -f1-5 >r$k.csv; done
+	tactus diagnose r1.csv r2.csv r3.csv r4.csv --json >said.json
+	jq -e '.verdict == "unexplained" and .series[0].unexplained[0].covariate == "recording"' said.json
+	jq -e '.series[0].unexplained[0].text | test("is another in every recording.*no column records")' said.json
+	made "" 1600 | cut -d, -f1-5 >whole.csv
+	for k in 1 2 3 4; do awk -v k=$k 'NR == 1 || int((NR - 2) / 400) == k - 1' whole.csv >r$k.csv; done
+	tactus diagnose r1.csv r2.csv r3.csv r4.csv --json | jq -e '.verdict == "nothing-wrong"'
+}
+
 # ---- options --------------------------------------------------------------------------------------------------------
 
 @test "--extended writes a model that force, simulate and fit accept, and names it in the JSON" {
