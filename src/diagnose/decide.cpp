@@ -145,21 +145,12 @@ class Decider
 	bool begin();
 	bool testable(const tactus_effect *effect) const
 	{
-		return effect->testable(problem.segments.front()) == nullptr;
-	}
-	/* The signal of the covariate that an effect acts through, -1 if that is none of the domain's. */
-	int column_of(const tactus_effect *effect) const
-	{
-		for (size_t s = 0; s < problem.domain->signal_count; s++)
-			if (strcmp(problem.domain->signals[s].name, effect->covariate) == 0 &&
-				problem.domain->signals[s].role == TACTUS_ROLE_COVARIATE)
-				return int(s);
-		return -1;
+		return !problem.untestable(effect);
 	}
 	/* Without the column nothing can be simulated: no rival either. */
 	bool recorded(const tactus_effect *effect) const
 	{
-		const int column = column_of(effect);
+		const int column = problem.covariate_of(effect);
 		return column < 0 || problem.segments.front()->recorded[column];
 	}
 	std::vector<Scored> screen(const Fit &fit, bool all) const;
@@ -591,7 +582,7 @@ void Decider::staleness()
 		const tactus_effect *effect = problem.domain->effects[i];
 		if (as_is.hypothesis.has(effect) || !recorded(effect))
 			continue;
-		const int column = column_of(effect);
+		const int column = problem.covariate_of(effect);
 		/* The calibration says that it was made under the same conditions: then these changed nothing. */
 		double then;
 		if (column >= 0 && evidence.provenance &&
@@ -645,7 +636,7 @@ Decision Decider::run(const std::function<bool(const Hypothesis &)> &rejudge)
 	const Screen on_base(problem, d.base);
 	for (size_t i = 0; problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
-		d.why.push_back(effect->testable(problem.segments.front()));
+		d.why.push_back(problem.untestable(effect));
 		d.screened.push_back(d.base.hypothesis.has(effect) ? Scored() : on_base.score(*shelf, effect));
 	}
 	d.wrong = map(d.base);

@@ -65,7 +65,7 @@ std::vector<VectorXd> candidate_columns(const Problem &problem, const Hypothesis
 	std::vector<VectorXd> columns;
 	for (size_t i = 0; problem.domain->effects[i]; i++) {
 		const tactus_effect *effect = problem.domain->effects[i];
-		if (h.has(effect) || effect->testable(problem.segments.front()))
+		if (h.has(effect) || problem.untestable(effect))
 			continue;
 		Grid grid = grid_of(problem, h, y, effect, 0, true, [](const VectorXd &column) { return column; });
 		std::move(grid.columns.begin(), grid.columns.end(), std::back_inserter(columns));
@@ -112,7 +112,7 @@ void Diagnosis::hold_stated(Work &work, Hypothesis &base) const
 		work.given = base;
 		work.evidence.given = &work.given;
 		for (size_t k = 0; domain->effects[k]; k++)
-			if (domain->effects[k]->held_base == i + 1 && !domain->effects[k]->testable(work.problem->segments.front()))
+			if (domain->effects[k]->held_base == i + 1 && !work.problem->untestable(domain->effects[k]))
 				base.base_free.erase(std::remove(base.base_free.begin(), base.base_free.end(), i),
 									 base.base_free.end());
 	}

@@ -177,6 +177,29 @@ size_t Problem::input_signal() const
 	return 0;
 }
 
+int Problem::covariate_of(const tactus_effect *effect) const
+{
+	for (size_t s = 0; s < domain->signal_count; s++)
+		if (strcmp(domain->signals[s].name, effect->covariate) == 0 && domain->signals[s].role == TACTUS_ROLE_COVARIATE)
+			return int(s);
+	return -1;
+}
+
+const char *Problem::untestable(const tactus_effect *effect) const
+{
+	const int column = covariate_of(effect);
+	double low = INFINITY, high = -INFINITY;
+	for (const tactus_series *series : segments) {
+		if (!effect->testable(series))
+			return nullptr;
+		if (column < 0 || !series->recorded[column])
+			continue;
+		low = std::fmin(low, tactus_series_minimum(series, column));
+		high = std::fmax(high, tactus_series_maximum(series, column));
+	}
+	return segments.size() > 1 && high > low ? nullptr : effect->testable(segments.front());
+}
+
 /*
  * Blocks are stretches of samples, 32 where there are enough, shared by the outputs; every fourth is held out. Three
  * recordings or more: the last third of them is held out whole. A few rows at either end of a held-out block are left

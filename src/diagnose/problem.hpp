@@ -122,6 +122,10 @@ class Problem
 		return measured.size();
 	}
 	size_t input_signal() const;
+	/* Why an effect cannot be tested here, or NULL: some recording can, or its covariate differs between them. */
+	const char *untestable(const tactus_effect *effect) const;
+	/* The signal of the covariate that an effect acts through, -1 if that is none of the domain's. */
+	int covariate_of(const tactus_effect *effect) const;
 	/* Shares the rows out to blocks; which of them are held out. */
 	void make_blocks();
 	void count_training();

@@ -188,6 +188,14 @@ survives() {
 	tactus diagnose r1.csv r2.csv r3.csv r4.csv --json | jq -e '.verdict == "nothing-wrong"'
 }
 
+@test "a temperature that differs between recordings is tested by them together" {
+	for k in 1 2 3 4; do
+		made "g = g * (1 + 0.004 * (5 * $k - 5)); x = 20 + 5 * $k" 400 | sed '1s/extra/temperature_degC/' >t$k.csv
+	done
+	tactus diagnose t1.csv --json | jq -e '[.series[0].not_testable[].effect] | index("temperature") != null'
+	tactus diagnose t1.csv t2.csv t3.csv t4.csv --json | jq -e '[.series[0].causes[].effect] == ["temperature"]'
+}
+
 # ---- options --------------------------------------------------------------------------------------------------------
 
 @test "--extended writes a model that force, simulate and fit accept, and names it in the JSON" {
