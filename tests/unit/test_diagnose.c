@@ -123,7 +123,7 @@ static void a_spectrum_has_the_clock_of_its_output(void **unused)
 		column[k] = tactus_table_set_numbers(table, names[k]);
 	for (size_t i = 0; i < N; i++) {
 		double g = tactus_table_numbers(single, "conductance_S")[i];
-		column[0][i] = 0.2 * (double)(i / 2) + 0.013 * (double)(i % 2);
+		column[0][i] = 0.1 * (double)(i - i % 2) + 0.013 * (double)(i % 2);
 		column[1][i] = tactus_table_numbers(single, "force_N")[i];
 		column[2][i] = i % 2 ? NAN : g;
 		column[3][i] = i % 2 ? 1e-6 * g : NAN;
