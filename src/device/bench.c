@@ -18,6 +18,21 @@ const char *tactus_builtin_find(const char *name)
 	return NULL;
 }
 
+int tactus_builtin_toml(const char *path, tactus_toml **document)
+{
+	const char *text = access(path, F_OK) != 0 ? tactus_builtin_find(path) : NULL;
+	return text != NULL ? tactus_toml_parse(path, text, document) : tactus_toml_read(path, document);
+}
+
+int tactus_bench_format(const tactus_toml_node *root)
+{
+	double format = 1;
+	const int status = tactus_toml_number(root, "format", &format);
+	if (status >= 0 && format != 1)
+		return tactus_toml_fail(root, "format", TACTUS_ERR_INPUT, "format %g is newer than this program", format);
+	return status;
+}
+
 /* ---- sections: a table of keys, each a number within bounds or a truth value ---- */
 
 #define POSITIVE 1e-300, INFINITY
@@ -150,7 +165,6 @@ static int read_modes(const tactus_toml_node *root, tactus_bench *bench)
 static int read_head(const tactus_toml_node *root, tactus_bench *bench)
 {
 	const char *kind = NULL;
-	double format = 1;
 	static const tactus_bench_key numbers[] = {
 		{"seed", 'n', offsetof(tactus_bench, seed), 1, 9007199254740992.0},
 		{"lost_scans", 'n', offsetof(tactus_bench, lost_scans), 0, 1},
@@ -160,9 +174,7 @@ static int read_head(const tactus_toml_node *root, tactus_bench *bench)
 		return tactus_toml_fail(root, kind != NULL ? "kind" : NULL, TACTUS_ERR_INPUT,
 								"a bench file says kind = \"bench\"");
 	if (status >= 0)
-		status = tactus_toml_number(root, "format", &format);
-	if (status >= 0 && format != 1)
-		return tactus_toml_fail(root, "format", TACTUS_ERR_INPUT, "format %g is newer than this program", format);
+		status = tactus_bench_format(root);
 	for (size_t i = 0; i < TACTUS_COUNT(numbers) && status >= 0; i++)
 		status = tactus_bench_read_key(root, &numbers[i], bench);
 	if (status >= 0)

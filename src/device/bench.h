@@ -2,6 +2,7 @@
 #ifndef TACTUS_BENCH_H
 #define TACTUS_BENCH_H
 
+#include "core/toml.h"
 #include "model/engine.h"
 
 enum { TACTUS_BENCH_SENSORS_MAX = 64, TACTUS_BENCH_EFFECTS_MAX = 16 };
@@ -100,6 +101,10 @@ typedef struct {
 } tactus_builtin;
 extern const tactus_builtin tactus_builtins[]; /* ends with a NULL name; benches and "loads-…" */
 const char *tactus_builtin_find(const char *name);
+/* A file, or the built-in one of that name where there is no such file. Negative if neither can be read. */
+int tactus_builtin_toml(const char *path, tactus_toml **document);
+/* TACTUS_ERR_INPUT with FILE:LINE:COLUMN for a bench or profile of a later format. */
+int tactus_bench_format(const tactus_toml_node *root);
 
 /* A built-in bench by name, or a file. TACTUS_ERR_DEVICE if it is neither, TACTUS_ERR_INPUT with FILE:LINE:COLUMN. */
 int tactus_bench_open(const char *name, tactus_bench **bench);

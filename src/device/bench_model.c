@@ -1,7 +1,6 @@
 /* A bench as others see it: its sensors' films as a model that can be simulated, and its facts in words. */
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <tactus/device.h>
 
@@ -21,9 +20,7 @@ bool tactus_bench_is(const char *path)
 	const char *kind = "";
 	if (strncmp(path, "sim:", 4) == 0)
 		return true;
-	const char *text = access(path, F_OK) != 0 ? tactus_builtin_find(path) : NULL;
-	if (strcmp(path, "-") == 0 ||
-		(text != NULL ? tactus_toml_parse(path, text, &document) : tactus_toml_read(path, &document)) < 0)
+	if (strcmp(path, "-") == 0 || tactus_builtin_toml(path, &document) < 0)
 		return false;
 	const tactus_toml_node *root = tactus_toml_root(document);
 	tactus_toml_string(root, "kind", &kind);

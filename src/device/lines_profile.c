@@ -24,15 +24,12 @@ void tactus_lines_profile_clear(tactus_lines_profile *profile)
 static int read_head(const tactus_toml_node *root, tactus_lines_profile *profile)
 {
 	const char *kind = NULL, *driver = NULL;
-	double format = 1;
 	int code = tactus_toml_string(root, "kind", &kind);
 	code = code < 0 ? code : tactus_toml_string(root, "driver", &driver);
 	if (code >= 0 && (kind == NULL || strcmp(kind, "profile") != 0 || driver == NULL || strcmp(driver, "lines") != 0))
 		return tactus_toml_fail(root, NULL, TACTUS_ERR_INPUT,
 								"a profile of lines of text says kind = \"profile\" and driver = \"lines\"");
-	code = code < 0 ? code : tactus_toml_number(root, "format", &format);
-	if (code >= 0 && format != 1)
-		return tactus_toml_fail(root, "format", TACTUS_ERR_INPUT, "format %g is newer than this program", format);
+	code = code < 0 ? code : tactus_bench_format(root);
 	code = code < 0 ? code : tactus_profile_text(root, "name", &profile->name);
 	return code < 0 ? code : tactus_profile_text(root, "description", &profile->description);
 }

@@ -113,15 +113,12 @@ static int read_head(tactus_profile_reader *r, const tactus_toml_node *root)
 {
 	static const char *const orders[] = {"ABCD", "CDAB", "BADC", "DCBA", NULL};
 	const char *kind = NULL;
-	double format = 1;
 	int order = TACTUS_ORDER_ABCD, first = 0;
 	int status = tactus_toml_string(root, "kind", &kind);
 	if (status >= 0 && (kind == NULL || strcmp(kind, "profile") != 0))
 		return tactus_toml_fail(root, kind != NULL ? "kind" : NULL, TACTUS_ERR_INPUT,
 								"a profile says kind = \"profile\"");
-	status = status < 0 ? status : tactus_toml_number(root, "format", &format);
-	if (status >= 0 && format != 1)
-		return tactus_toml_fail(root, "format", TACTUS_ERR_INPUT, "format %g is newer than this program", format);
+	status = status < 0 ? status : tactus_bench_format(root);
 	status = status < 0 ? status : tactus_profile_text(root, "driver", &r->profile->driver);
 	status = status < 0 ? status : tactus_profile_choice(root, "order", orders, &order);
 	status = status < 0 ? status : tactus_profile_integer(root, "first_address", 0, 1, &first);

@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <unistd.h>
 
 #include "core/core.h"
 #include "core/toml.h"
@@ -17,10 +16,8 @@ enum { TEXT = 2048 };
 bool tactus_profile_is(const char *path)
 {
 	tactus_toml *document = NULL;
-	const char *kind = "", *text = strcmp(path, "-") != 0 ? tactus_builtin_find(path) : NULL;
-	const bool file = access(path, F_OK) == 0;
-	if ((!file && text == NULL) ||
-		(file ? tactus_toml_read(path, &document) : tactus_toml_parse(path, text, &document)) < 0)
+	const char *kind = "";
+	if (strcmp(path, "-") == 0 || tactus_builtin_toml(path, &document) < 0)
 		return false;
 	tactus_toml_string(tactus_toml_root(document), "kind", &kind);
 	const bool is = strcmp(kind, "profile") == 0;
@@ -114,6 +111,12 @@ static int add_identity(const tactus_profile *p, tactus_metadata *facts)
 	return code;
 }
 
+static int add_head(const char *name, const char *description, tactus_metadata *facts)
+{
+	const int code = name != NULL ? tactus_metadata_set(facts, "name", name) : TACTUS_OK;
+	return code < 0 || description == NULL ? code : tactus_metadata_set(facts, "description", description);
+}
+
 /* How many requests a scan is. */
 static int count_requests(const tactus_profile *p, tactus_metadata *facts)
 {
@@ -143,9 +146,7 @@ static int describe_registers(const char *name, tactus_metadata *facts, tactus_m
 	int code = tactus_profile_open(name, true, &p);
 	if (code < 0)
 		return code;
-	const char *texts[][2] = {{"name", p->name}, {"description", p->description}};
-	for (size_t i = 0; i < TACTUS_COUNT(texts) && code >= 0; i++)
-		code = texts[i][1] != NULL ? tactus_metadata_set(facts, texts[i][0], texts[i][1]) : code;
+	code = add_head(p->name, p->description, facts);
 	code = code < 0 ? code : tactus_metadata_set_number(facts, "unit", p->link.unit);
 	code = code < 0 ? code : tactus_metadata_set_number(facts, "timeout_s", p->link.timeout_s);
 	snprintf(line, sizeof(line), "%d baud, 8%c%d", p->link.baud, p->link.parity, p->link.stop_bits);
@@ -173,9 +174,7 @@ static int describe_lines(const char *path, tactus_metadata *facts, tactus_metad
 	tactus_lines_profile p;
 	int code = tactus_lines_profile_init(&p);
 	code = code < 0 ? code : tactus_lines_profile_read(path, &p);
-	const char *texts[][2] = {{"name", p.name}, {"description", p.description}};
-	for (size_t i = 0; i < TACTUS_COUNT(texts) && code >= 0; i++)
-		code = texts[i][1] != NULL ? tactus_metadata_set(facts, texts[i][0], texts[i][1]) : code;
+	code = code < 0 ? code : add_head(p.name, p.description, facts);
 	code = code < 0 ? code : tactus_metadata_set_number(facts, "baud", p.baud);
 	for (size_t i = 0; code >= 0 && i < tactus_metadata_count(p.metadata); i++)
 		code = tactus_metadata_set(facts, tactus_metadata_key(p.metadata, i), tactus_metadata_value(p.metadata, i));

@@ -197,7 +197,8 @@ const char *Problem::untestable(const tactus_effect *effect) const
 		low = std::fmin(low, tactus_series_minimum(series, column));
 		high = std::fmax(high, tactus_series_maximum(series, column));
 	}
-	return segments.size() > 1 && high > low ? nullptr : effect->testable(segments.front());
+	const bool differs = high - low > 0.01 * std::fmax(std::abs(low), std::abs(high)); /* as a calibration's do not */
+	return segments.size() > 1 && differs ? nullptr : effect->testable(segments.front());
 }
 
 /*

@@ -181,7 +181,7 @@ const tactus_candidate *candidates_of(Store &store, const Work &work, size_t *co
 	std::vector<tactus_candidate> result;
 	for (size_t i = 0; i < d.screened.size(); i++)
 		result.push_back({work.problem->domain->effects[i]->name,
-						  d.screened[i].part.free.empty() ? NAN : d.screened[i].cost, d.why[i]});
+						  d.why[i] || d.screened[i].part.free.empty() ? NAN : d.screened[i].cost, d.why[i]});
 	*count = result.size();
 	return store.keep(std::move(result));
 }
@@ -255,25 +255,12 @@ const tactus_trace *traces_of(Store &store, const Work &work, size_t *count)
 	return store.keep(std::move(result));
 }
 
-/* Of the output's own readings: where scans read in two modes, a series has a row of each. */
-double median_step(const tactus_trace &trace)
-{
-	std::vector<double> steps;
-	for (size_t i = 1; i < trace.n; i++)
-		steps.push_back(trace.time_s[i] - trace.time_s[i - 1]);
-	const auto middle = steps.begin() + long(steps.size() / 2);
-	std::nth_element(steps.begin(), middle, steps.end());
-	return *middle;
-}
-
 /* Welch's periodogram with Hann windows, and the autocorrelation, of one residual at even steps. */
-void spectra(Store &store, const tactus_trace &trace, bool clock, tactus_diagnosed *result)
+void spectra(Store &store, const tactus_trace &trace, double dt, tactus_diagnosed *result)
 {
 	const size_t n = trace.n;
 	if (n < 64)
 		return;
-	const double dt = median_step(trace);
-	clock = clock && dt > 0;
 	size_t window = 64;
 	while (window * 2 <= n / 4 && window < 4096)
 		window *= 2;
@@ -314,6 +301,7 @@ void spectra(Store &store, const tactus_trace &trace, bool clock, tactus_diagnos
 	};
 	const std::vector<double> before = residual(trace.base), after = residual(trace.extended);
 	std::vector<double> frequency, lag;
+	const bool clock = std::isfinite(dt) && dt > 0;
 	for (size_t k = 1; k <= window / 2; k++)
 		frequency.push_back(double(k) / double(window) / (clock ? dt : 1));
 	result->spectrum = {clock ? "frequency / Hz" : "frequency / sample⁻¹", frequency.size(), store.keep(frequency),
@@ -437,7 +425,7 @@ tactus_diagnosed report(Store &store, const Work &work, const char *device, uint
 	s.experiment = propose(store, work, device);
 	s.traces = traces_of(store, work, &s.trace_count);
 	if (s.trace_count)
-		spectra(store, s.traces[0], work.problem->segments.front()->has_clock, &s);
+		spectra(store, s.traces[0], work.problem->segments.front()->dt, &s);
 	s.summary = store.text(summary_of(s));
 	return s;
 }

@@ -161,8 +161,8 @@ const tactus_dependence *describe(Store &store, const Work &work, const std::vec
 		} else if (group.aspect == "level of each") {
 			const auto [low, high] = std::minmax_element(shown.mean.begin(), shown.mean.end());
 			auto place = [&](auto extreme) {
-				return quantity(*extreme * problem.scale[output], work.output_unit[output]) + " in the " +
-					   std::to_string(int(std::lround(shown.at[size_t(extreme - shown.mean.begin())]))) + ". recording";
+				return quantity(*extreme * problem.scale[output], work.output_unit[output]) + " in recording " +
+					   std::to_string(int(std::lround(shown.at[size_t(extreme - shown.mean.begin())])));
 			};
 			text = store.format("the residual of %s is another in every recording: %s, %s", what, place(low).c_str(),
 								place(high).c_str());

@@ -3,9 +3,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-#include <tactus/version.h>
 
 #include "core/core.h"
 #include "fit/fit_work.h"

@@ -145,20 +145,36 @@ static int compare_doubles(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* Median of the steps forward in time. */
-static double median_step(const double *time_s, size_t n)
+/* Median of the steps forward in time, between rows that have a value. */
+static double median_step(const double *time_s, const double *value, size_t n)
 {
 	double *steps = malloc((n + 1) * sizeof *steps), median = NAN;
 	size_t count = 0;
-	for (size_t i = 1; steps != NULL && i < n; i++)
-		if (time_s[i] > time_s[i - 1])
-			steps[count++] = time_s[i] - time_s[i - 1];
+	double before = NAN;
+	for (size_t i = 0; steps != NULL && i < n; i++) {
+		if (isnan(value[i]))
+			continue;
+		if (time_s[i] > before)
+			steps[count++] = time_s[i] - before;
+		before = time_s[i];
+	}
 	if (count > 0) {
 		qsort(steps, count, sizeof *steps, compare_doubles);
 		median = 0.5 * (steps[(count - 1) / 2] + steps[count / 2]);
 	}
 	free(steps);
 	return median;
+}
+
+/* Of the output that is read most often: scans in two modes have rows of each in turn, some milliseconds apart. */
+static double output_step(const tactus_series *series, size_t time_signal)
+{
+	const double *time_s = series->signal[time_signal];
+	double least = NAN;
+	for (size_t s = 0; s < series->domain->signal_count; s++)
+		if (series->domain->signals[s].role == TACTUS_ROLE_OUTPUT && series->signal[s] != NULL)
+			least = fmin(least, median_step(time_s, series->signal[s], series->n));
+	return isnan(least) ? median_step(time_s, time_s, series->n) : least;
 }
 
 static int fill_series(const tactus_columns *columns, const group *g, bool inputs_only, tactus_series *series)
@@ -184,7 +200,7 @@ static int fill_series(const tactus_columns *columns, const group *g, bool input
 	series->has_clock = series->recorded[columns->time_signal];
 	series->has_order = series->has_clock || columns->sequence != NULL;
 	if (series->has_clock && !inputs_only)
-		series->dt = median_step(series->signal[columns->time_signal], g->n);
+		series->dt = output_step(series, columns->time_signal);
 	return TACTUS_OK;
 }
 

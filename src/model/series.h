@@ -26,7 +26,7 @@ typedef struct tactus_series {
 	const char
 		*mode[TACTUS_OUTPUTS_MAX]; /* "dc", "ac" or "" (no such column): the rows that an output was taken from */
 	bool has_clock, has_order;
-	double dt; /* median step of time_s; NaN without a clock */
+	double dt; /* median step of time_s between readings of one output; NaN without a clock */
 } tactus_series;
 
 typedef struct {

@@ -35,17 +35,25 @@ static double load_N(double t)
 	return 20 - 20 * cos(2 * 3.14159265358979 * (t - 90) / 20);
 }
 
+/* Its columns are asked for again once all are there: adding one may move the others. */
+static tactus_table *table_of(const char *const *names, size_t count, size_t rows, double **column)
+{
+	tactus_table *table = tactus_table_new();
+	assert_int_equal(tactus_table_resize(table, rows), 0);
+	for (size_t k = 0; k < count; k++)
+		tactus_table_set_numbers(table, names[k]);
+	for (size_t k = 0; k < count; k++)
+		column[k] = tactus_table_set_numbers(table, names[k]);
+	return table;
+}
+
 /* A spring in series with a Kelvin element: its strain by Euler's rule in small steps; share of the load, τ = 8 s. */
 static tactus_table *recording_with_jump(double creep, double gain, double jump_S, uint64_t seed)
 {
-	tactus_table *table = tactus_table_new();
-	assert_int_equal(tactus_table_resize(table, N), 0);
-	/* Every column is asked for again once all are there: adding one may move the others. */
-	tactus_table_set_numbers(table, "time_s");
-	tactus_table_set_numbers(table, "force_N");
-	tactus_table_set_numbers(table, "conductance_S");
-	double *time = tactus_table_set_numbers(table, "time_s"), *force = tactus_table_set_numbers(table, "force_N"),
-		   *g = tactus_table_set_numbers(table, "conductance_S"), strain = 0;
+	const char *const names[] = {"time_s", "force_N", "conductance_S"};
+	double *column[3], strain = 0;
+	tactus_table *table = table_of(names, 3, N, column);
+	double *time = column[0], *force = column[1], *g = column[2];
 	for (size_t i = 0; i < N; i++) {
 		time[i] = 0.1 * (double)i;
 		force[i] = load_N(time[i]);
@@ -113,14 +121,9 @@ static void creep_is_named_and_its_gain_is_what_it_does(void **unused)
 static void a_spectrum_has_the_clock_of_its_output(void **unused)
 {
 	(void)unused;
-	tactus_table *single = recording(0.08, 1, 4), *table = tactus_table_new();
-	const char *names[] = {"time_s", "force_N", "conductance_S", "capacitance_F"};
-	assert_int_equal(tactus_table_resize(table, N), 0);
-	for (size_t k = 0; k < 4; k++)
-		tactus_table_set_numbers(table, names[k]);
+	const char *const names[] = {"time_s", "force_N", "conductance_S", "capacitance_F"};
 	double *column[4];
-	for (size_t k = 0; k < 4; k++)
-		column[k] = tactus_table_set_numbers(table, names[k]);
+	tactus_table *single = recording(0.08, 1, 4), *table = table_of(names, 4, N, column);
 	for (size_t i = 0; i < N; i++) {
 		double g = tactus_table_numbers(single, "conductance_S")[i];
 		column[0][i] = 0.1 * (double)(i - i % 2) + 0.013 * (double)(i % 2);
@@ -156,15 +159,10 @@ static void a_coarse_converter_is_named_through_noise(void **unused)
 {
 	(void)unused;
 	enum { ROWS = 800 };
-	const char *names[] = {"time_s", "reference_resistance_ohm", "frequency_Hz", "drive_V", "amplitude_V"};
+	const char *const names[] = {"time_s", "reference_resistance_ohm", "frequency_Hz", "drive_V", "amplitude_V"};
 	for (int coarse = 0; coarse <= 1; coarse++) {
-		tactus_table *table = tactus_table_new();
-		assert_int_equal(tactus_table_resize(table, ROWS), 0);
-		for (size_t k = 0; k < 5; k++)
-			tactus_table_set_numbers(table, names[k]);
 		double *column[5];
-		for (size_t k = 0; k < 5; k++)
-			column[k] = tactus_table_set_numbers(table, names[k]);
+		tactus_table *table = table_of(names, 5, ROWS, column);
 		uint64_t seed = 11;
 		const double step = 0.02;
 		for (size_t i = 0; i < ROWS; i++) {
