@@ -419,7 +419,7 @@ made() {
 			t = i / 10; f = i % 200 < 100 ? i % 200 : 200 - i % 200; x = rand() - 0.5
 			g = 1e-6 + 4e-7 * f + 2e-8 * (rand() + rand() + rand() - 1.5)
 			$1
-			printf \"%.10g,%d,1,%s,%s,%.10g\n\", t, i, f, g, x
+			printf \"%.10g,%d,1,%s,%s,%s\n\", t, i, f, g, x
 		}
 	}"
 }
@@ -496,8 +496,11 @@ made() {
 }
 
 @test "a column that one output follows is seen beside a larger misfit of the other" {
-	made 'for (k = 1; k <= 3; k++) s[k] += (f - s[k]) / 10 ^ k; c = 3e-13 * (f + 0.05 * s[1] + 0.08 * s[2] + 0.1 * s[3]) + 1e-14 * (rand() - 0.5)
-		x = sin(i / 97); g += 1e-6 * x; x = x "," c' 3000 | sed '1s/extra/humidity,capacitance_F/' >two.csv
+	made 'f = 100 + 90 * sin(0.273 * t) + 30 * (int(i / 300) % 2); split("3 30 100", tau, " ")
+		for (k = 1; k <= 3; k++) s[k] += (f - s[k]) * 0.1 / tau[k]
+		x = 40 + 20 * sin(0.103 * t + 1); g = 6e-7 + 4e-7 * f + 1e-7 * x + 5e-9 * (rand() - 0.5)
+		x = x "," 1e-11 + 3e-13 * (f + 0.05 * s[1] + 0.08 * s[2] + 0.1 * s[3]) + 1e-14 * (rand() - 0.5)' 3000 |
+		sed '1s/extra/humidity,capacitance_F/' >two.csv
 	tactus diagnose two.csv --json | jq -e 'any(.series[0].wrong[]; .covariate == "humidity" and .explained > 0.5)'
 }
 
