@@ -245,8 +245,10 @@ int tactus_device_recover(tactus_device *device, double timeout_s)
 			tactus_live_gap(&device->live, 1e-9 * (double)(tactus_clock_ns() - lost_ns));
 			return TACTUS_OK;
 		}
-		if (code == TACTUS_ERR_INTERRUPTED || tactus_live_over(&device->live))
-			return code == TACTUS_ERR_INTERRUPTED ? code : TACTUS_OK;
+		if (code == TACTUS_ERR_INTERRUPTED)
+			return code;
+		if (tactus_live_over(&device->live))
+			return tactus_fail(TACTUS_ERR_LOST, "lost and not found again before the end of the scan");
 		const double left_s = timeout_s - 1e-9 * (double)(tactus_clock_ns() - began_ns);
 		if (!(left_s > 0))
 			return tactus_fail(TACTUS_ERR_LOST, "lost and not found again within %g s: %s", timeout_s,

@@ -489,6 +489,29 @@ static void test_a_device_that_falls_silent_is_lost_and_found_again(void **state
 	}
 }
 
+/* What was asked for did not come: the end of its time does not make that a scan that went well. */
+static void test_a_device_that_does_not_come_back_before_the_end_is_lost(void **state)
+{
+	(void)state;
+	modbus_bench b = {0};
+	char *path = rig_file(".toml", ONE);
+	tactus_reading reading;
+	tactus_device *device = NULL;
+	tactus_scan_settings settings = tactus_scan_defaults();
+	settings.duration_s = 0.3;
+	bench_start(&b);
+	assert_int_equal(tactus_device_open(bench_uri(&b, path, "&timeout=20ms&retries=0"), &device), 0);
+	assert_int_equal(tactus_device_start(device, &settings), 0);
+	b.deaf = true;
+	assert_int_equal(tactus_device_read(device, &reading, 1), TACTUS_ERR_LOST);
+	assert_int_equal(tactus_device_recover(device, 60), TACTUS_ERR_LOST);
+	assert_non_null(strstr(tactus_error_message(), "before the end of the scan"));
+	assert_int_equal(tactus_device_faults(device).reconnections, 0);
+	tactus_device_close(device);
+	rig_remove(path);
+	bench_stop(&b);
+}
+
 /* Nothing but its readings says that it is there. */
 static void test_a_silent_device_is_not_found_by_its_port_alone(void **state)
 {
@@ -605,6 +628,7 @@ int main(void)
 		cmocka_unit_test(test_a_slow_register_is_read_in_every_so_manieth_scan_and_held_between),
 		cmocka_unit_test(test_a_start_that_fails_half_way_leaves_the_device_safe),
 		cmocka_unit_test(test_a_device_that_falls_silent_is_lost_and_found_again),
+		cmocka_unit_test(test_a_device_that_does_not_come_back_before_the_end_is_lost),
 		cmocka_unit_test(test_a_silent_device_is_not_found_by_its_port_alone),
 		cmocka_unit_test(test_a_board_that_starts_anew_is_told_everything_again),
 		cmocka_unit_test(test_an_hour_of_traffic_leaves_memory_and_descriptors_as_they_were),
