@@ -46,6 +46,7 @@ class Solver
 		VectorXd alpha, beta, residual; /* beta: per delta of the structure */
 		MatrixXd phi, d;                /* columns of the linear parameters per delta, derivatives of the others */
 		bool known = false, with_d = false;
+		bool filled = false; /* phi has the columns that never change */
 	};
 
 	ForwardProblem &problem;
@@ -56,7 +57,7 @@ class Solver
   private:
 	bool columns(const VectorXd &values);
 
-	State accepted; /* the last one with derivatives */
+	State accepted; /* the last one with derivatives before now */
 	VectorXd rest, y;
 };
 
@@ -71,8 +72,11 @@ bool Solver::columns(const VectorXd &values)
 		return false;
 	now.phi.resize(problem.measured.size(), Index(structure.linear.size()));
 	for (size_t c = 0; c < structure.linear.size(); c++) {
-		if (!first && structure.constant[c])
+		if (!first && structure.constant[c]) {
+			if (!now.filled)
+				now.phi.col(Index(c)) = accepted.phi.col(Index(c));
 			continue;
+		}
 		const size_t j = structure.linear[c];
 		VectorXd one = structure.constant[c] ? plain : point;
 		one[Index(j)] = structure.delta[j];
@@ -82,6 +86,7 @@ bool Solver::columns(const VectorXd &values)
 		}
 		now.phi.col(Index(c)) = y - rest;
 	}
+	now.filled = true;
 	return true;
 }
 
@@ -91,9 +96,11 @@ bool Solver::eliminate(VectorXd &values)
 	VectorXd alpha(Index(structure.nonlinear.size()));
 	for (size_t k = 0; k < structure.nonlinear.size(); k++)
 		alpha[Index(k)] = values[Index(structure.nonlinear[k])];
-	if (accepted.known && accepted.alpha == alpha && !(now.known && now.alpha == alpha))
-		now = accepted;
-	if (!now.known || now.alpha != alpha) {
+	const auto is = [&alpha](const State &state) { return state.known && state.alpha == alpha; };
+	/* A step is tried in the other's place: where it is refused, that with derivatives is still there. */
+	if (!is(now) && (now.with_d || is(accepted)))
+		std::swap(now, accepted);
+	if (!is(now)) {
 		now.known = now.with_d = false;
 		if (!columns(values))
 			return false;
@@ -125,8 +132,7 @@ bool Solver::derivatives(const VectorXd &values)
 	if (now.with_d)
 		return true;
 	now.d.resize(problem.measured.size(), Index(structure.nonlinear.size()));
-	const VectorXd y0 = problem.measured - now.residual;
-	const double rounding = 1e-12 * y0.norm();
+	const double rounding = 1e-12 * (problem.measured - now.residual).norm();
 	for (size_t k = 0; k < structure.nonlinear.size(); k++) {
 		const Slot &s = problem.slots[structure.nonlinear[k]];
 		const auto at = Index(structure.nonlinear[k]);
@@ -135,17 +141,14 @@ bool Solver::derivatives(const VectorXd &values)
 			moved[at] = step_inside(s, values[at], s.scale * step);
 			if (!problem.simulate(moved, y))
 				return false;
-			y -= y0;
+			y -= problem.measured - now.residual;
 			const bool moves = y.norm() > rounding;
 			now.d.col(Index(k)) = y * (moves ? 1 / (moved[at] - values[at]) : 0);
 			if (moves)
 				break;
 		}
 	}
-	now.with_d = now.d.allFinite();
-	if (now.with_d && !structure.nonlinear.empty())
-		accepted = now;
-	return now.with_d;
+	return now.with_d = now.d.allFinite();
 }
 
 /* What Ceres minimises: the projected residual of the whole series, compressed to (nonlinear + 1) numbers. */
