@@ -159,6 +159,7 @@ class Decider
 	Fit without(const Fit &fit, const tactus_effect *effect) const;
 	void select();
 	void prune();
+	bool more_of(const Cause &other, const Cause &cause) const;
 	bool challenge(Cause &cause);
 	void add_alike(Cause &cause) const;
 	void settle();
@@ -273,7 +274,30 @@ void Decider::prune()
 			d.causes.erase(d.causes.begin() + long(i));
 			again = true;
 		}
+		for (size_t i = 0; i < d.causes.size() && !again; i++)
+			for (size_t k = 0; k < d.causes.size() && !again; k++) {
+				if (!more_of(d.causes[k], d.causes[i]))
+					continue;
+				d.final = Fit(d.causes[i].without);
+				d.causes.erase(d.causes.begin() + long(i));
+				again = true;
+			}
 	}
+}
+
+/*
+ * True if a stronger cause says as much twice (a lag of second order, a creep of two times) as it does with this one
+ * beside it: then its form is what is not exact.
+ */
+bool Decider::more_of(const Cause &other, const Cause &cause) const
+{
+	const Fit &left = cause.without;
+	if (!(other.without.cost > left.cost) || has_instants(other.effect))
+		return false;
+	Hypothesis twice = left.hypothesis;
+	twice.add(problem.domain, Screen(problem, left).score(*shelf, other.effect).part);
+	const Fit fit = problem.fit(twice, Rows::train);
+	return fit.ok && merit(fit, left) <= limits.far * merit(d.final, left);
 }
 
 /*

@@ -112,14 +112,22 @@ struct ForceErrors {
 	double quick = NAN; /* what changes from one sample to the next, as noise does */
 };
 
+bool acts(const Hypothesis &h, unsigned flag)
+{
+	return std::any_of(h.parts.begin(), h.parts.end(), [flag](const Part &part) {
+		return (part.effect->flags & flag) != 0 && !tactus_effect_neutral(part.effect, part.value.data());
+	});
+}
+
 ForceErrors force_errors(const Work &work, const Hypothesis &h)
 {
 	const Problem &problem = *work.problem;
 	if (!work.newtons())
 		return {};
 	const std::unique_ptr<tactus_model, ModelFree> model(model_of(work, h, problem.noise));
-	if (!model || tactus_model_whole(model.get()))
+	if (!model || acts(h, TACTUS_EFFECT_NEIGHBOURS))
 		return {}; /* coupled channels are not solved one by one */
+	const bool moved = acts(h, TACTUS_EFFECT_RESTAMP);
 	double square = 0, count = 0, change = 0, changes = 0;
 	for (size_t segment = 0; segment < problem.segments.size(); segment++) {
 		tactus_estimator *made = nullptr;
@@ -158,7 +166,10 @@ ForceErrors force_errors(const Work &work, const Hypothesis &h)
 				last = NAN;
 				continue;
 			}
-			const double error = force.force_N - value(SENSOR_FORCE, i, NAN);
+			const double error =
+				force.force_N - (moved ? tactus_series_load_at(s, force.time_s) : value(SENSOR_FORCE, i, NAN));
+			if (!std::isfinite(error))
+				continue;
 			square += error * error;
 			count++;
 			if (std::isfinite(error - last)) {

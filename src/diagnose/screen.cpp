@@ -125,13 +125,13 @@ const tactus_search *search_of(const tactus_effect *effect, size_t parameter)
 	return nullptr;
 }
 
+} // namespace
+
 bool has_instants(const tactus_effect *effect)
 {
 	return std::any_of(effect->searches, effect->searches + effect->search_count,
 					   [](const tactus_search &search) { return search.kind == TACTUS_SEARCH_INSTANT; });
 }
-
-} // namespace
 
 Grid grid_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, const tactus_effect *effect, int term,
 			 bool coarse, const std::function<VectorXd(const VectorXd &)> &keep)

@@ -14,6 +14,7 @@ namespace tactus::explain
 
 /* The term of an effect that a parameter belongs to (engine.h). */
 int term_of(const tactus_effect *effect, size_t parameter);
+bool has_instants(const tactus_effect *effect);
 
 /* A term of an effect at one choice of what is searched over a grid: a column per strength, from `first` on. */
 struct Point {

@@ -71,11 +71,6 @@ double tactus_mean_square(const double *estimate, const double *reference, size_
 double tactus_combination_bound(const double *first, const double *second, const double *reference, size_t n,
 								double *correlation);
 
-/* The signal of a domain's o-th output; SIZE_MAX if there is none. */
-size_t tactus_output_signal(const tactus_domain *domain, size_t o);
-/* The first signal with this role; SIZE_MAX if there is none. */
-size_t tactus_role_signal(const tactus_domain *domain, enum tactus_role role);
-
 #ifdef __cplusplus
 }
 #endif

@@ -214,24 +214,6 @@ static tactus_sample sample_of(const tactus_work *work, const place *at, const d
 	return sample;
 }
 
-/* The load at an instant, between the samples around it. */
-static double load_at(const tactus_series *s, double time)
-{
-	const double *t = s->signal[SENSOR_TIME], *force = s->signal[SENSOR_FORCE];
-	size_t low = 0, high = s->n - 1;
-	if (!(time >= t[low]) || !(time <= t[high]))
-		return NAN;
-	while (high - low > 1) {
-		size_t middle = low + (high - low) / 2;
-		if (t[middle] <= time)
-			low = middle;
-		else
-			high = middle;
-	}
-	double step = t[high] - t[low];
-	return step > 0 ? force[low] + (force[high] - force[low]) * (time - t[low]) / step : force[low];
-}
-
 static bool restamps(const tactus_plan *plan)
 {
 	for (size_t k = 0; k < plan->effect_count; k++)
@@ -277,7 +259,7 @@ static void score_one(void *context, size_t slot)
 		}
 		const tactus_series *series = &r->work->series[at->channel];
 		outcome->estimate_N[p] = force.force_N;
-		outcome->reference_N[p] = restamps(r->plan) ? load_at(series, force.time_s)
+		outcome->reference_N[p] = restamps(r->plan) ? tactus_series_load_at(series, force.time_s)
 								  : pairs(r->plan)  ? r->work->points[at->channel].input[p]
 													: series->signal[SENSOR_FORCE][at->sample];
 	}

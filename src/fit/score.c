@@ -40,22 +40,6 @@ double tactus_combination_bound(const double *first, const double *second, const
 	return 1 - r2 * (1 - rho * rho) / (1 + r2 - 2 * rho * sqrt(r2));
 }
 
-size_t tactus_role_signal(const tactus_domain *domain, enum tactus_role role)
-{
-	for (size_t s = 0; s < domain->signal_count; s++)
-		if (domain->signals[s].role == role)
-			return s;
-	return SIZE_MAX;
-}
-
-size_t tactus_output_signal(const tactus_domain *domain, size_t o)
-{
-	for (size_t s = 0; s < domain->signal_count; s++)
-		if (domain->signals[s].role == TACTUS_ROLE_OUTPUT && o-- == 0)
-			return s;
-	return SIZE_MAX;
-}
-
 typedef struct {
 	atomic_size_t next;
 	size_t count;

@@ -169,3 +169,19 @@ double tactus_unit_range(const char *unit, double input_range, const double *out
 	return range_of(unit, length, input_range, output_range, outputs) /
 		   range_of(below, strlen(below), input_range, output_range, outputs);
 }
+
+size_t tactus_role_signal(const tactus_domain *domain, enum tactus_role role)
+{
+	for (size_t s = 0; s < domain->signal_count; s++)
+		if (domain->signals[s].role == role)
+			return s;
+	return SIZE_MAX;
+}
+
+size_t tactus_output_signal(const tactus_domain *domain, size_t o)
+{
+	for (size_t s = 0; s < domain->signal_count; s++)
+		if (domain->signals[s].role == TACTUS_ROLE_OUTPUT && o-- == 0)
+			return s;
+	return SIZE_MAX;
+}

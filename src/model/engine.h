@@ -185,6 +185,10 @@ struct tactus_domain {
 };
 
 extern const struct tactus_domain tactus_domain_sensor, tactus_domain_readout;
+/* The signal of a domain's o-th output; SIZE_MAX if there is none. */
+size_t tactus_output_signal(const tactus_domain *domain, size_t o);
+/* The first signal with this role; SIZE_MAX if there is none. */
+size_t tactus_role_signal(const tactus_domain *domain, enum tactus_role role);
 
 /* Indexes of signals. The tables in domain_sensor.c and domain_readout.c are in this order. */
 enum tactus_sensor_signal {

@@ -1,6 +1,7 @@
 /* How much of a signal a series holds: what the `testable` hooks of effects ask. */
 #include <math.h>
 
+#include "model/engine.h"
 #include "model/series.h"
 
 double tactus_series_minimum(const tactus_series *series, int signal)
@@ -61,4 +62,22 @@ size_t tactus_series_reversals(const tactus_series *series, int signal)
 		low = high = values[i];
 	}
 	return count;
+}
+
+double tactus_series_load_at(const tactus_series *series, double time_s)
+{
+	const double *time = series->signal[tactus_role_signal(series->domain, TACTUS_ROLE_TIME)],
+				 *load = series->signal[tactus_role_signal(series->domain, TACTUS_ROLE_INPUT)];
+	size_t low = 0, high = series->n - 1;
+	if (!(time_s >= time[low]) || !(time_s <= time[high]))
+		return NAN;
+	while (high - low > 1) {
+		size_t middle = low + (high - low) / 2;
+		if (time[middle] <= time_s)
+			low = middle;
+		else
+			high = middle;
+	}
+	double step = time[high] - time[low];
+	return step > 0 ? load[low] + (load[high] - load[low]) * (time_s - time[low]) / step : load[low];
 }

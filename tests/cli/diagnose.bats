@@ -549,6 +549,44 @@ made() {
 	done
 }
 
+@test "a lag of second order is a lag, with no time offset beside it" {
+	"$PYTHON" - >two_poles.csv <<-'EOP'
+		import numpy as np
+		from scipy.signal import lfilter
+		rng = np.random.default_rng(5)
+		dt, fine, n = 2e-3, 20, 8000
+		t = np.arange(n * fine) * dt / fine
+		load = 20 + sum(3 * np.sin(2 * np.pi * f * t + p) for f, p in zip(rng.uniform(0.3, 12, 9), rng.uniform(0, 6, 9)))
+		shown = load
+		for tau in (0.012, 0.005):
+		    k = 1 - np.exp(-dt / fine / tau)
+		    shown = lfilter([k], [1, k - 1], shown, zi=[(1 - k) * shown[0]])[0]
+		g = 1e-6 + 4e-7 * shown[::fine] + 4e-8 * rng.standard_normal(n)
+		print("time_s,force_N,conductance_S")
+		for row in zip(t[::fine], load[::fine], g):
+		    print("%.6g,%.8g,%.8g" % row)
+	EOP
+	tactus diagnose two_poles.csv --json >said.json
+	jq -e '.series[0] | [.causes[].effect] == ["lag"] and .structure_remains' said.json
+}
+
+@test "what a time offset costs in newtons is measured at the re-stamped times" {
+	"$PYTHON" - >offset.csv <<-'EOP'
+		import numpy as np
+		rng = np.random.default_rng(6)
+		t = np.arange(4000) * 0.01
+		load = lambda t: 40 + 20 * np.sin(2.1 * t) + 10 * np.sin(5.3 * t + 1)
+		g = 1e-6 + 4e-7 * load(t - 0.05) + 4e-8 * rng.standard_normal(len(t))
+		print("time_s,force_N,conductance_S")
+		for row in zip(t, load(t), g):
+		    print("%.6g,%.8g,%.8g" % row)
+	EOP
+	tactus diagnose offset.csv --json >said.json
+	jq -e '.series[0].causes[0].effect == "time-offset"' said.json
+	# 0.05 s at some 55 N/s; the noise is 0.1 N
+	jq -e '.series[0].gain | .force_rmse_before_N > 1 and .force_rmse_after_N > 0.09 and .force_rmse_after_N < 0.12' said.json
+}
+
 @test "a cause that may harm stretches no choice has seen leaves structure, and is said to" {
 	made 'if (i >= 590 && i < 650) g = g * 1.12 + 6e-7; g += 5e-7 * (rand() + rand() + rand() - 1.5)' 1000 >moved.csv
 	tactus diagnose moved.csv --json >said.json
