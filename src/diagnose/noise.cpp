@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnose/gram.h"
+
 namespace tactus::explain
 {
 
@@ -11,72 +13,70 @@ namespace
 {
 
 using Products = Saturated::Products;
+using Scaled = Saturated::Scaled;
 using Pieces = std::vector<std::pair<Index, Index>>;
 
 const size_t most_columns = 120;
-const Index chunk = 512; /* rows at a time: they stay in the cache */
+const Index chunk = 256; /* rows at a time, a multiple of 4: they stay in the cache */
 
-/* Rows of the pieces put together; an outlier is as if it were predicted: of no weight in the sums. */
-void gather(const Problem &problem, const Pieces &pieces, const Eigen::Ref<const VectorXd> &column, double factor,
-			Eigen::Ref<VectorXd> to)
+/* Sums of products of the columns; those of the leading ones are known. */
+Products products_of(const Problem &problem, const Pieces &pieces, const std::vector<Scaled> &columns,
+					 const Products &known)
 {
-	Index at = 0;
-	for (const auto &[first, count] : pieces) {
-		for (Index i = 0; i < count; i++)
-			to[at + i] = problem.excluded[size_t(first + i)] ? 0 : column[first + i] * factor;
-		at += count;
-	}
-}
-
-/* Sums of products of z's columns; those of the leading ones are known. */
-Products products_of(const Pieces &pieces, const MatrixXd &z, const Products &known)
-{
-	const Index q = z.cols(), old = known.now.cols(), fresh = q - old;
-	const MatrixXd none = MatrixXd::Zero(q, q);
-	Products p{none, none, none, none, z.rows(), Index(pieces.size())};
-	MatrixXd pairs = none, ends = none; /* Σ (z + the row before)² = now + before + cross: half the work of cross */
-	p.now.topLeftCorner(old, old) = known.now;
-	pairs.topLeftCorner(old, old) = known.now + known.before + known.cross;
-	auto add = [&](const auto &rows, MatrixXd &to) {
-		to.bottomRightCorner(fresh, fresh)
-			.selfadjointView<Eigen::Lower>()
-			.rankUpdate(rows.rightCols(fresh).transpose());
-		to.bottomLeftCorner(fresh, old).noalias() += rows.rightCols(fresh).transpose() * rows.leftCols(old);
+	const auto q = Index(columns.size()), old = known.all.cols();
+	MatrixXd pairs = MatrixXd::Zero(q, q); /* Σ (row + the row before)² = 2 all − ends + cross: half the work */
+	Products p{pairs, pairs, pairs, 0, Index(pieces.size())};
+	MatrixXd rows(4 + chunk, q); /* from the fourth on: the row before, then the chunk, then 0 */
+	auto add = [&](Index from, Index m, MatrixXd &sums) {
+		const Index whole = (m + 3) / 4 * 4;
+		rows.middleRows(from + m, whole - m).setZero();
+		if (q > old)
+			tactus_add_gram(size_t(whole), size_t(old), size_t(q), rows.data() + from, size_t(rows.rows()),
+							sums.data());
 	};
-	Index at = 0;
 	for (const auto &[first, count] : pieces) {
-		const auto rows = z.middleRows(at, count);
-		for (Index i = 1; i < count; i += chunk) {
-			const Index m = std::min(chunk, count - i);
-			add(rows.middleRows(i, m), p.now);
-			add(MatrixXd(rows.middleRows(i, m) + rows.middleRows(i - 1, m)), pairs);
+		for (Index at = 1; at == 1 || at < count; at += chunk) {
+			const Index m = std::min(chunk, count - at);
+			for (Index j = 0; j < q; j++)
+				rows.col(j).segment(3, m + 1) = columns[size_t(j)].rows(first + at - 1, m + 1);
+			for (Index i = 0; i <= m; i++)
+				if (problem.excluded[size_t(first + at - 1 + i)]) /* as if it were predicted */
+					rows.row(3 + i).setZero();
+			if (at == 1) {
+				p.ends += rows.row(3).transpose() * rows.row(3);
+				p.all += rows.row(3).transpose() * rows.row(3);
+			}
+			if (at + m >= count)
+				p.ends += rows.row(3 + m).transpose() * rows.row(3 + m);
+			add(4, m, p.all);
+			for (Index j = 0; j < q; j++) /* in place, from the first on */
+				rows.col(j).segment(3, m) += rows.col(j).segment(4, m);
+			add(3, m, pairs);
 		}
-		p.first += rows.row(0).transpose() * rows.row(0);
-		ends += rows.row(count - 1).transpose() * rows.row(count - 1);
-		at += count;
+		p.n += count;
 	}
-	for (MatrixXd *sums : {&p.now, &pairs})
+	p.cross = pairs - 2 * p.all + p.ends;
+	p.all.topLeftCorner(old, old) = known.all;
+	p.cross.topLeftCorner(old, old) = known.cross;
+	for (MatrixXd *sums : {&p.all, &p.cross})
 		sums->triangularView<Eigen::StrictlyUpper>() = sums->transpose();
-	p.before = p.now + p.first - ends;
-	p.cross = pairs - p.now - p.before;
 	return p;
 }
 
 Products leading(const Products &p, Index q)
 {
 	auto corner = [&](const MatrixXd &sums) { return MatrixXd(sums.topLeftCorner(q, q)); };
-	return {corner(p.now), corner(p.before), corner(p.cross), corner(p.first), p.n, p.runs};
+	return {corner(p.all), corner(p.cross), corner(p.ends), p.n, p.runs};
 }
 
-/* Turns z into orthonormal columns, as many as are independent, and the last one, which stays: z times the result. */
+/* Turns columns into orthonormal ones, as many as are independent, and the last one, which stays. */
 MatrixXd independent(const Products &p)
 {
-	const Index q = p.now.cols() - 1;
+	const Index q = p.all.cols() - 1;
 	MatrixXd turn = MatrixXd::Ones(1, 1);
 	if (q == 0)
 		return turn;
-	const MatrixXd gram = (p.now + p.first).topLeftCorner(q, q);
-	const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
+	const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(p.all.topLeftCorner(q, q));
 	std::vector<Index> kept;
 	for (Index j = 0; j < q; j++)
 		if (eigen.eigenvalues()[j] > 1e-7 * eigen.eigenvalues()[q - 1])
@@ -88,17 +88,20 @@ MatrixXd independent(const Products &p)
 	return turn;
 }
 
-/* The same sums of z times `turn`. */
+/* The same sums of the columns times `turn`. */
 Products turned(const Products &p, const MatrixXd &turn)
 {
 	auto of = [&](const MatrixXd &sums) { return MatrixXd(turn.transpose() * sums * turn); };
-	return {of(p.now), of(p.before), of(p.cross), of(p.first), p.n, p.runs};
+	return {of(p.all), of(p.cross), of(p.ends), p.n, p.runs};
 }
 
-/* −2 × restricted log likelihood of an AR(1) process, and what the regression then gives. */
+/*
+ * −2 × restricted log likelihood of an AR(1) process, and what the regression then gives: the sums are of
+ * (row − φ row before)², and of (1 − φ²) first² for every run.
+ */
 double restricted(const Products &p, double phi, double *square, VectorXd *coefficients)
 {
-	MatrixXd g = p.now - phi * p.cross + phi * phi * p.before + (1 - phi * phi) * p.first;
+	const MatrixXd g = (1 + phi * phi) * p.all - phi * p.cross - phi * phi * p.ends;
 	const Index q = g.cols() - 1;
 	const Eigen::LLT<MatrixXd> factor(g.topLeftCorner(q, q) + 1e-12 * MatrixXd::Identity(q, q));
 	const VectorXd b = factor.solve(g.topRightCorner(q, 1));
@@ -222,7 +225,7 @@ Saturated::Saturated(const Problem &p, Columns c) : problem(p), columns(std::mov
 void Saturated::forget()
 {
 	for (Output &output : outputs)
-		output.z.resize(0, 0);
+		output.sums.n = 0;
 }
 
 void Saturated::choose(Output &output, const VectorXd &residual) const
@@ -244,10 +247,10 @@ void Saturated::choose(Output &output, const VectorXd &residual) const
 	}
 	std::sort(order.begin(), order.end());
 	order.resize(std::min<size_t>({order.size(), size_t(n / 3), most_columns}));
-	output.z.resize(n, Index(order.size()));
-	for (size_t j = 0; j < order.size(); j++)
-		gather(problem, output.pieces, columns[order[j].second], 1 / size[order[j].second], output.z.col(Index(j)));
-	output.sums = products_of(output.pieces, output.z, {});
+	output.kept.clear();
+	for (const auto &[told, j] : order)
+		output.kept.push_back({columns[j].data(), 1 / size[j]});
+	output.sums = products_of(problem, output.pieces, output.kept, {});
 }
 
 Noise Saturated::judge(const VectorXd &y, const std::vector<VectorXd> &own, VectorXd &left)
@@ -262,18 +265,21 @@ Noise Saturated::judge(const VectorXd &y, const std::vector<VectorXd> &own, Vect
 		if (!problem.outputs[o])
 			continue;
 		Output &output = outputs[o];
-		if (output.z.rows() == 0)
+		if (output.sums.n == 0)
 			choose(output, residual);
-		const Index n = output.z.rows(), most = std::min<Index>(n / 3, Index(most_columns)),
-					added = std::min<Index>(Index(own.size()), most), kept = std::min(output.z.cols(), most - added);
-		MatrixXd z(n, kept + added + 1);
-		z.leftCols(kept) = output.z.leftCols(kept);
+		const Index n = output.sums.n, most = std::min<Index>(n / 3, Index(most_columns)),
+					added = std::min<Index>(Index(own.size()), most),
+					kept = std::min(Index(output.kept.size()), most - added);
+		std::vector<Scaled> all(output.kept.begin(), output.kept.begin() + kept);
 		for (Index j = 0; j < added; j++) {
-			gather(problem, output.pieces, own[size_t(j)], 1, z.col(kept + j));
-			z.col(kept + j) /= std::fmax(z.col(kept + j).norm(), 1e-300);
+			double square = 0;
+			for (const auto &[first, count] : output.pieces)
+				for (Index i = first; i < first + count; i++)
+					square += problem.excluded[size_t(i)] ? 0 : own[size_t(j)][i] * own[size_t(j)][i];
+			all.push_back({own[size_t(j)].data(), 1 / std::fmax(std::sqrt(square), 1e-300)});
 		}
-		gather(problem, output.pieces, residual, 1, z.col(kept + added));
-		const Products sums = products_of(output.pieces, z, leading(output.sums, kept));
+		all.push_back({residual.data(), 1});
+		const Products sums = products_of(problem, output.pieces, all, leading(output.sums, kept));
 		const MatrixXd turn = independent(sums);
 		const Products p = turned(sums, turn);
 		double phi = p.n > 30 && !sorted_by_input(problem, o) ? best_phi(p) : 0;
@@ -282,9 +288,18 @@ Noise Saturated::judge(const VectorXd &y, const std::vector<VectorXd> &own, Vect
 		double square;
 		VectorXd b;
 		restricted(p, phi, &square, &b);
-		VectorXd weight = -(turn.leftCols(b.size()) * b); /* of the columns of z; the residual's own is 1 */
+		VectorXd weight = -(turn.leftCols(b.size()) * b); /* of the columns; the residual's own is 1 */
 		weight[weight.size() - 1] += 1;
-		const VectorXd e = z * weight;
+		VectorXd e = VectorXd::Zero(n);
+		Index to = 0;
+		for (const auto &[first, count] : output.pieces) {
+			for (Index j = 0; j < weight.size(); j++)
+				e.segment(to, count) += weight[j] * all[size_t(j)].rows(first, count);
+			for (Index i = 0; i < count; i++)
+				if (problem.excluded[size_t(first + i)])
+					e[to + i] = 0;
+			to += count;
+		}
 		VectorXd u = e;
 		u.tail(u.size() - 1) -= phi * e.head(e.size() - 1);
 		const std::vector<double> rest = p.n > 200 ? further(u, std::min<Index>(12, p.n / 40)) : std::vector<double>();

@@ -27,17 +27,29 @@ class Saturated
 	/* Rows were excluded since: everything is summed again. */
 	void forget();
 
-	/* Sums of products of the rows with themselves, of the rows before, of both with each other; of the first rows. */
+	/* A column, and what its rows are multiplied by. */
+	struct Scaled {
+		const double *values;
+		double factor;
+		auto rows(Index first, Index count) const
+		{
+			return VectorXd::Map(values + first, count) * factor;
+		}
+	};
+	/*
+	 * Sums of products of columns: over all rows; of each row and the one before it, both ways; over the first and the
+	 * last row of every run.
+	 */
 	struct Products {
-		MatrixXd now, before, cross, first; /* cross: with its transpose */
+		MatrixXd all, cross, ends;
 		Index n = 0, runs = 0;
 	};
 
   private:
 	struct Output {
 		std::vector<std::pair<Index, Index>> pieces; /* first row and count of its runs */
-		MatrixXd z;                                  /* its columns of length 1, at its rows; empty: not yet chosen */
-		Products sums;                               /* of z */
+		std::vector<Scaled> kept;                    /* its columns, of length 1 */
+		Products sums;                               /* of them; of no rows: not yet chosen */
 	};
 	void choose(Output &output, const VectorXd &residual) const;
 
