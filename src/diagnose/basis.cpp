@@ -137,28 +137,27 @@ class Collector
 	explicit Collector(const Problem &p) : problem(p)
 	{
 	}
-	/* Columns of each output on their own: what helps one says nothing of the other. */
-	void add(const std::string &covariate, const std::string &aspect, const MatrixXd &columns, const VectorXd &values,
+	/* What helps one output says nothing of the other: each has its own size, and 0 where there is nothing to see. */
+	void add(const std::string &covariate, const std::string &aspect, MatrixXd columns, const VectorXd &values,
 			 bool unknown = false)
 	{
-		Group group{covariate, aspect, unknown, {}, values};
-		Index kept = 0;
-		group.columns.resize(problem.rows(), columns.cols() * Index(problem.output_count));
+		bool any = false;
 		for (size_t o = 0; o < problem.output_count; o++)
-			for (Index j = 0; problem.outputs[o] && j < columns.cols(); j++) {
-				VectorXd column = VectorXd::Zero(problem.rows());
+			for (Index j = 0; j < columns.cols(); j++) {
+				double square = 0;
 				for (const Run &run : problem.runs)
 					if (run.output == o)
-						column.segment(run.first, run.count) = columns.col(j).segment(run.first, run.count);
-				const double size = column.norm();
-				if (column.allFinite() && size > 0)
-					group.columns.col(kept++) = column / size * std::sqrt(double(problem.rows()));
+						square += columns.col(j).segment(run.first, run.count).squaredNorm();
+				const bool seen = square > 0 && std::isfinite(square);
+				any = any || seen;
+				for (const Run &run : problem.runs)
+					if (run.output == o && seen)
+						columns.col(j).segment(run.first, run.count) *= std::sqrt(double(problem.rows()) / square);
+					else if (run.output == o)
+						columns.col(j).segment(run.first, run.count).setZero();
 			}
-		if (kept == 0)
-			return;
-		if (kept < group.columns.cols())
-			group.columns.conservativeResize(Eigen::NoChange, kept);
-		result.push_back(std::move(group));
+		if (any)
+			result.push_back({covariate, aspect, unknown, std::move(columns), values});
 	}
 	std::vector<Group> result;
 

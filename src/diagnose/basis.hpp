@@ -15,7 +15,7 @@ struct Group {
 	std::string covariate; /* a column, or words such as "row order" */
 	std::string aspect;    /* "level", "sensitivity", "history", "direction" */
 	bool unknown = false;  /* a column that the domain does not know */
-	MatrixXd columns;      /* per row of the problem, scaled */
+	MatrixXd columns;      /* per row of the problem, scaled; each output has coefficients of its own */
 	VectorXd values;       /* the covariate at the rows; empty where it is none */
 };
 

@@ -473,16 +473,15 @@ bool Decider::needless(const Group &group) const
 	problem.simulate(d.base.hypothesis, y0);
 	problem.simulate(d.final.hypothesis, y1);
 	problem.mask(r, Rows::train);
-	MatrixXd with(problem.rows(), group.columns.cols() + 1);
-	with << group.columns, y1 - y0;
-	auto left = [&](const MatrixXd &columns) {
-		const MatrixXd all = masked(problem, d.base.jacobian, columns, true);
-		MatrixXd gram = all.transpose() * all;
-		gram.diagonal().array() += 1e-9;
-		const VectorXd b = all.transpose() * r;
-		return r.squaredNorm() - b.dot(gram.ldlt().solve(b));
+	MatrixXd with(problem.rows(), d.base.jacobian.cols() + 1);
+	with << d.base.jacobian, problem.whiten(y1 - y0);
+	const MatrixXd columns = whitened(problem, group.columns);
+	auto left = [&](const MatrixXd &shared) {
+		Regression regression(problem, shared, columns, r);
+		regression.gram.diagonal().array() += 1e-9;
+		return r.squaredNorm() - regression.right.dot(regression.gram.ldlt().solve(regression.right));
 	};
-	const double n = double(problem.training), alone = left(group.columns), both = left(with);
+	const double n = double(problem.training), alone = left(d.base.jacobian), both = left(with);
 	const double own = double(d.final.slots.size() - d.base.slots.size());
 	return n * std::log(std::fmax(both, 1e-300) / alone) + own * std::log(n) > -limits.evidence ||
 		   alone - both < limits.share * alone;
