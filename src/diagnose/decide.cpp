@@ -136,7 +136,7 @@ namespace
 class Decider
 {
   public:
-	explicit Decider(const Evidence &e) : evidence(e), problem(*e.problem)
+	Decider(const Evidence &e, const Around &a) : evidence(e), problem(*e.problem), around(a)
 	{
 	}
 	Decision run(const std::function<bool(const Hypothesis &)> &rejudge);
@@ -174,6 +174,7 @@ class Decider
 
 	const Evidence &evidence;
 	const Problem &problem;
+	const Around &around;
 	std::unique_ptr<Shelf> shelf;
 	Decision d;
 };
@@ -645,7 +646,7 @@ bool Decider::begin()
 	if (!d.base.ok)
 		return false;
 	/* Around the base by least squares: weighted by coloured noise, a gross misfit may turn its very sign. */
-	shelf = std::make_unique<Shelf>(problem, evidence.base);
+	shelf = std::make_unique<Shelf>(around);
 	select();
 	return true;
 }
@@ -673,9 +674,9 @@ Decision Decider::run(const std::function<bool(const Hypothesis &)> &rejudge)
 
 } // namespace
 
-Decision decide(const Evidence &evidence, const std::function<bool(const Hypothesis &)> &rejudge)
+Decision decide(const Evidence &evidence, const Around &around, const std::function<bool(const Hypothesis &)> &rejudge)
 {
-	return Decider(evidence).run(rejudge);
+	return Decider(evidence, around).run(rejudge);
 }
 
 } // namespace tactus::explain

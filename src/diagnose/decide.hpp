@@ -63,10 +63,10 @@ struct Evidence {
 };
 
 /*
- * `rejudge` is asked once, with what was found before anything is put in doubt: true if the problem's noise
- * or its rows are others since, and all begins again.
+ * `around`: columns of the candidates around the base. `rejudge` is asked once, with what was found before anything is
+ * put in doubt: true if the problem's noise or its rows are others since, and all begins again.
  */
-Decision decide(const Evidence &evidence, const std::function<bool(const Hypothesis &)> &rejudge);
+Decision decide(const Evidence &evidence, const Around &around, const std::function<bool(const Hypothesis &)> &rejudge);
 
 /* Standard errors that a block's paired gain lies above 0: Σ (a − b) over training blocks. */
 double paired(const Problem &problem, const std::vector<double> &a, const std::vector<double> &b);

@@ -60,24 +60,24 @@ std::vector<VectorXd> own_columns(const Problem &problem, const Hypothesis &h, c
 }
 
 /* And along those of every candidate. */
-std::vector<VectorXd> candidate_columns(const Problem &problem, const Hypothesis &h, const VectorXd &y)
+std::vector<Column> candidate_columns(const Around &around)
 {
-	std::vector<VectorXd> columns;
-	for (size_t i = 0; problem.domain->effects[i]; i++) {
-		const tactus_effect *effect = problem.domain->effects[i];
-		if (h.has(effect) || problem.untestable(effect))
+	std::vector<Column> columns;
+	for (size_t i = 0; around.problem.domain->effects[i]; i++) {
+		const tactus_effect *effect = around.problem.domain->effects[i];
+		if (around.hypothesis.has(effect) || around.problem.untestable(effect))
 			continue;
-		Grid grid = grid_of(problem, h, y, effect, 0, true, [](const VectorXd &column) { return column; });
-		std::move(grid.columns.begin(), grid.columns.end(), std::back_inserter(columns));
+		const Grid grid = grid_of(around, effect, 0, true, [](const Column &column) { return column; });
+		columns.insert(columns.end(), grid.columns.begin(), grid.columns.end());
 	}
 	return columns;
 }
 
-Saturated::Columns seen(const std::vector<VectorXd> &candidates, const std::vector<Group> &groups)
+Saturated::Columns seen(const std::vector<Column> &candidates, const std::vector<Group> &groups)
 {
 	Saturated::Columns columns;
-	for (const VectorXd &column : candidates)
-		columns.emplace_back(column.data(), column.size());
+	for (const Column &column : candidates)
+		columns.emplace_back(column->data(), column->size());
 	for (const Group &group : groups)
 		for (Index j = 0; j < group.columns.cols(); j++)
 			columns.emplace_back(group.columns.col(j).data(), group.columns.rows());
@@ -170,11 +170,12 @@ void Diagnosis::explain(Work &work)
 	work.evidence.groups = groups_of(problem, gathered.extras(work), y, work.input_name);
 	work.evidence.base = plain.hypothesis;
 	{
-		const std::vector<VectorXd> candidates = candidate_columns(problem, plain.hypothesis, y);
+		const Around around(problem, plain.hypothesis);
+		const std::vector<Column> candidates = candidate_columns(around);
 		Saturated saturated(problem, seen(candidates, work.evidence.groups));
 		judge(work, saturated, plain.hypothesis, y);
 		/* What a large cause left unlike its form had passed for noise: with the cause there it may be much less. */
-		work.decision = decide(work.evidence, [&](const Hypothesis &found) {
+		work.decision = decide(work.evidence, around, [&](const Hypothesis &found) {
 			const Noise before = problem.noise;
 			const size_t wild = work.outliers.size();
 			problem.simulate(found, y);

@@ -285,11 +285,11 @@ bool Problem::simulate(const Hypothesis &h, VectorXd &y) const
 	const std::unique_ptr<tactus_chain, ChainFree> chain(made);
 	const bool simple = std::all_of(h.parts.begin(), h.parts.end(), memoryless);
 	y.resize(rows());
-	std::vector<double> buffer;
+	VectorXd buffer;
 	for (size_t k = 0; k < segments.size(); k++) {
 		const bool few = simple && kinds[k].count > 0;
 		const size_t n = few ? kinds[k].count : segments[k]->n;
-		buffer.resize(n * output_count);
+		buffer.resize(Index(n * output_count));
 		double *signal[TACTUS_SIGNALS_MAX];
 		std::copy_n(few ? kinds[k].signal : segments[k]->signal, TACTUS_SIGNALS_MAX, signal);
 		for (size_t o = 0; o < output_count; o++)
@@ -303,13 +303,13 @@ bool Problem::simulate(const Hypothesis &h, VectorXd &y) const
 			double *values = buffer.data() + run.output * n;
 			for (size_t i = 0; i < n; i++)
 				values[i] /= scale[run.output];
-			for (Index i = run.first; i < run.first + run.count; i++) {
-				const size_t at = sample[size_t(i)];
-				y[i] = values[few ? kinds[k].of[at] : at];
-			}
+			const size_t *at = sample.data() + run.first, *kind = few ? kinds[k].of.data() : nullptr;
+			double *to = y.data() + run.first;
+			for (Index i = 0; i < run.count; i++)
+				to[i] = values[kind ? kind[at[i]] : at[i]];
 		}
 	}
-	return y.allFinite();
+	return std::isfinite((y * 0.0).sum()); /* all of them are */
 }
 
 VectorXd Problem::whiten(const Eigen::Ref<const VectorXd> &x) const

@@ -78,34 +78,19 @@ std::vector<double> values_of(const Problem &problem, const tactus_effect *effec
 	return values;
 }
 
-/* Change of the outputs per unit when the parameter of a part is set to `value`. */
-bool column_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, Part part, size_t parameter,
-			   double value, VectorXd &column)
-{
-	const double neutral = part.effect->parameters[parameter].neutral;
-	part.value[parameter] = value;
-	Hypothesis with = h;
-	with.add(problem.domain, part);
-	if (value == neutral || !problem.simulate(with, column))
-		return false;
-	column = (column - y) / (value - neutral);
-	return column.norm() * std::abs(value - neutral) > 1e-9 * y.norm();
-}
-
 bool parallel(const VectorXd &a, const VectorXd &b, double cosine)
 {
 	return a.dot(b) > cosine * a.norm() * b.norm();
 }
 
 /* Values of a strength to look from: one where the answer is a line, several where it is not. */
-std::vector<double> steps_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, const Part &part,
-							 size_t parameter, bool coarse)
+std::vector<double> steps_of(const Around &around, const Part &part, size_t parameter, bool coarse)
 {
 	const tactus_parameter &info = part.effect->parameters[parameter];
-	const double step = problem.ranged(info, info.start) - info.neutral;
-	VectorXd small, large;
-	if (column_of(problem, h, y, part, parameter, info.neutral + 0.01 * step, small) &&
-		column_of(problem, h, y, part, parameter, info.neutral + step, large) && parallel(small, large, 0.99999))
+	const double step = around.problem.ranged(info, info.start) - info.neutral;
+	const Column small = around.column(part, parameter, info.neutral + 0.01 * step, coarse),
+				 large = small ? around.column(part, parameter, info.neutral + step, coarse) : small;
+	if (large && parallel(*small, *large, 0.99999))
 		return {info.neutral + step};
 	std::vector<double> values;
 	const std::vector<double> few = {0.01, 0.1, 0.4, 2, 10},
@@ -133,9 +118,38 @@ bool has_instants(const tactus_effect *effect)
 					   [](const tactus_search &search) { return search.kind == TACTUS_SEARCH_INSTANT; });
 }
 
-Grid grid_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, const tactus_effect *effect, int term,
-			 bool coarse, const std::function<VectorXd(const VectorXd &)> &keep)
+Around::Around(const Problem &p, Hypothesis h) : problem(p), hypothesis(std::move(h))
 {
+	problem.simulate(hypothesis, y);
+}
+
+Column Around::column(Part part, size_t parameter, double value, bool keep) const
+{
+	const double neutral = part.effect->parameters[parameter].neutral;
+	part.value[parameter] = value;
+	const Key key{part.effect, parameter, part.value};
+	if (const auto at = known.find(key); at != known.end())
+		return at->second;
+	if (key != last.first) {
+		Hypothesis with = hypothesis;
+		with.add(problem.domain, part);
+		VectorXd change;
+		last = {key, nullptr};
+		if (value != neutral && problem.simulate(with, change)) {
+			change = (change - y) / (value - neutral);
+			if (change.norm() * std::abs(value - neutral) > 1e-9 * y.norm())
+				last.second = std::make_shared<const VectorXd>(std::move(change));
+		}
+	}
+	if (keep)
+		known[key] = last.second;
+	return last.second;
+}
+
+Grid grid_of(const Around &around, const tactus_effect *effect, int term, bool coarse,
+			 const std::function<Column(const Column &)> &make)
+{
+	const Problem &problem = around.problem;
 	std::vector<Point> shapes(1);
 	Grid result;
 	shapes[0].part = problem.neutral(effect);
@@ -155,7 +169,7 @@ Grid grid_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, con
 	}
 	std::vector<size_t> lines;
 	for (const Point &shape : shapes) {
-		std::vector<VectorXd> columns;
+		std::vector<Column> columns;
 		Point together = shape;
 		for (size_t p = 0; p < effect->parameter_count; p++) {
 			const tactus_parameter &info = effect->parameters[p];
@@ -165,23 +179,22 @@ Grid grid_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, con
 			const bool line = std::find(lines.begin(), lines.end(), p) != lines.end();
 			const std::vector<double> steps = own    ? values_of(problem, effect, *own, coarse)
 											  : line ? std::vector<double>{problem.ranged(info, info.start)}
-													 : steps_of(problem, h, y, shape.part, p, coarse);
-			VectorXd column;
+													 : steps_of(around, shape.part, p, coarse);
 			if (steps.size() == 1 && !own) {
 				if (!line)
 					lines.push_back(p);
-				if (column_of(problem, h, y, shape.part, p, steps[0], column)) {
+				if (const Column column = around.column(shape.part, p, steps[0], coarse)) {
 					together.strengths.push_back(p);
-					columns.push_back(keep(column));
+					columns.push_back(make(column));
 				}
 				continue;
 			}
 			for (const double value : steps)
-				if (column_of(problem, h, y, shape.part, p, value, column)) {
+				if (const Column column = around.column(shape.part, p, value, coarse)) {
 					Point alone = shape;
 					alone.strengths = {p};
 					alone.first = Index(result.columns.size());
-					result.columns.push_back(keep(column));
+					result.columns.push_back(make(column));
 					alone.part.value[p] = value; /* where the column was taken: scored as a start */
 					result.points.push_back(std::move(alone));
 				}
@@ -195,9 +208,8 @@ Grid grid_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, con
 	return result;
 }
 
-Shelf::Shelf(const Problem &p, Hypothesis around) : problem(p), hypothesis(std::move(around))
+Shelf::Shelf(const Around &a) : around(a)
 {
-	problem.simulate(hypothesis, y);
 }
 
 const Shelf::Term &Shelf::term(const tactus_effect *effect, int number) const
@@ -206,13 +218,15 @@ const Shelf::Term &Shelf::term(const tactus_effect *effect, int number) const
 	Term &term = at->second;
 	if (!made)
 		return term;
-	Grid grid = grid_of(problem, hypothesis, y, effect, number, false,
-						[this](const VectorXd &column) { return problem.training_rows(problem.whiten(column)); });
+	const Problem &problem = around.problem;
+	Grid grid = grid_of(around, effect, number, false, [&](const Column &column) {
+		return std::make_shared<const VectorXd>(problem.training_rows(problem.whiten(*column)));
+	});
 	term.points = std::move(grid.points);
 	term.columns.resize(problem.training, Index(grid.columns.size()));
 	for (size_t j = 0; j < grid.columns.size(); j++) {
-		term.columns.col(Index(j)) = grid.columns[j];
-		grid.columns[j].resize(0);
+		term.columns.col(Index(j)) = *grid.columns[j];
+		grid.columns[j].reset();
 	}
 	for (const Point &point : term.points) {
 		std::vector<MatrixXd> grams;

@@ -4,6 +4,8 @@
 
 #include <functional>
 #include <map>
+#include <memory>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -24,18 +26,39 @@ struct Point {
 	Index first = 0;
 };
 
-/* One term of an effect: all its points, and what they change in the scaled outputs per unit of the strength. */
+/* What a parameter changes in the scaled outputs per unit, or NULL: nothing. */
+using Column = std::shared_ptr<const VectorXd>;
+
+/* One term of an effect: all its points and their columns. */
 struct Grid {
 	std::vector<Point> points;
-	std::vector<VectorXd> columns;
+	std::vector<Column> columns;
+};
+
+/* What surrounds a hypothesis. Columns that were asked for are kept if told so, and the last one always. */
+class Around
+{
+  public:
+	Around(const Problem &problem, Hypothesis hypothesis);
+	/* Where the parameter of a part, of an effect that the hypothesis has not, is set to `value`. */
+	Column column(Part part, size_t parameter, double value, bool keep) const;
+
+	const Problem &problem;
+	const Hypothesis hypothesis;
+	VectorXd y; /* that it predicts */
+
+  private:
+	using Key = std::tuple<const tactus_effect *, size_t, std::vector<double>>;
+	mutable std::map<Key, Column> known;
+	mutable std::pair<Key, Column> last;
 };
 
 /*
- * The grid of one term around a hypothesis that predicts y, every column as `keep` makes it of the change; empty if the
- * effect has no such term. A coarse one spans about the same space with fewer columns.
+ * The grid of one term, every column as `make` makes it of the change; empty if the effect has no such term. A coarse
+ * one spans about the same space with fewer columns; they are kept, for a fine one has most of them too.
  */
-Grid grid_of(const Problem &problem, const Hypothesis &h, const VectorXd &y, const tactus_effect *effect, int term,
-			 bool coarse, const std::function<VectorXd(const VectorXd &)> &keep);
+Grid grid_of(const Around &around, const tactus_effect *effect, int term, bool coarse,
+			 const std::function<Column(const Column &)> &make);
 
 /*
  * Columns of every candidate around one hypothesis, whitened, of the rows that train; taken when first asked for. A
@@ -51,13 +74,11 @@ class Shelf
 		std::vector<std::vector<MatrixXd>> gram; /* of the columns of each point, per output */
 	};
 
-	Shelf(const Problem &problem, Hypothesis around);
+	explicit Shelf(const Around &around);
 	const Term &term(const tactus_effect *effect, int term) const;
 
   private:
-	const Problem &problem;
-	Hypothesis hypothesis;
-	VectorXd y;
+	const Around &around;
 	mutable std::map<std::pair<const tactus_effect *, int>, Term> terms;
 };
 
