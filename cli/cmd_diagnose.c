@@ -1,8 +1,10 @@
 /* tactus diagnose: what a simulation gets wrong, the cause, the extended model, what it gains. */
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #ifdef __GLIBC__
 #include <malloc.h>
+#include <sys/mman.h>
 #endif
 
 #include "diagnose.h"
@@ -191,13 +193,21 @@ static int over_recordings(const struct cli *cli, const char *const *paths, size
 	return status;
 }
 
-/* Large matrices come and go all the time: their pages are kept, or the kernel would clear them each time. */
+/*
+ * Large matrices come and go all the time: their pages are kept, or the kernel would clear them each time. The first
+ * of them are large pages where there are any: one fault for 512.
+ */
 static void keep_pages(void)
 {
 #ifdef __GLIBC__
 	mallopt(M_MMAP_THRESHOLD, 1 << 30);
 	mallopt(M_TRIM_THRESHOLD, 1 << 30);
 	mallopt(M_TOP_PAD, 1 << 24);
+	const size_t room = 1 << 28, page = 1 << 21;
+	void *first = malloc(room);
+	if (first)
+		madvise((void *)(((uintptr_t)first + page) / page * page), room - page, MADV_HUGEPAGE);
+	free(first);
 #endif
 }
 
