@@ -167,7 +167,9 @@ class Decider
 	void imprints();
 	void adequacy();
 	void staleness();
+	std::pair<double, double> beside(const Group &group, const Fit &left) const;
 	bool needless(const Group &group) const;
+	bool wanders(const Cause &cause) const;
 	double bursts(const Fit &fit) const;
 	std::vector<Dependence> map(const Fit &fit) const;
 	enum tactus_verdict verdict() const;
@@ -228,6 +230,8 @@ bool Decider::stands(const Fit &with, const Fit &without) const
 	for (size_t o = 0; o < problem.output_count; o++) {
 		const double before = without.square_of[o],
 					 gain = (before - with.square_of[o]) * earned(with.parameters - without.parameters);
+		if (!(before - with.square_of[o] > problem.blurred(o)))
+			continue;
 		const bool much = gain > limits.further_share * (d.base.square_of[o] - before + gain);
 		const bool rest = gain > limits.completing * (before - double(problem.training_of[o])) &&
 						  gain > limits.completing_share * before;
@@ -447,7 +451,8 @@ std::vector<Dependence> Decider::map(const Fit &fit) const
 	std::vector<Dependence> found;
 	for (const Group &group : evidence.groups) {
 		const Dependence dep = dependence(problem, fit, group);
-		if (!(dep.p_value * double(evidence.groups.size()) < limits.structure_p) || !(dep.whitened > limits.structure))
+		if (!(dep.p_value * double(evidence.groups.size()) < limits.structure_p) ||
+			!(dep.whitened > limits.structure) || !(dep.removed > problem.blurred(dep.output)))
 			continue;
 		auto same = std::find_if(found.begin(), found.end(),
 								 [&](const Dependence &f) { return f.group->covariate == group.covariate; });
@@ -459,7 +464,7 @@ std::vector<Dependence> Decider::map(const Fit &fit) const
 	std::sort(found.begin(), found.end(),
 			  [](const Dependence &a, const Dependence &b) { return a.whitened > b.whitened; });
 	VectorXd y;
-	problem.simulate(fit.hypothesis, y);
+	problem.simulate(problem.levelled(fit.hypothesis, Rows::train), y);
 	VectorXd raw = problem.measured - y;
 	problem.mask(raw, Rows::train);
 	for (Dependence &dep : found)
@@ -467,25 +472,42 @@ std::vector<Dependence> Decider::map(const Fit &fit) const
 	return found;
 }
 
-/* True if the causes have nothing to say that an unknown column does not say better. */
-bool Decider::needless(const Group &group) const
+/* How much the criterion falls, and by what share the squares, when what was found joins a group beside `left`. */
+std::pair<double, double> Decider::beside(const Group &group, const Fit &left) const
 {
-	VectorXd y0, y1, r = d.base.residual;
-	problem.simulate(d.base.hypothesis, y0);
+	VectorXd y0, y1, r = left.residual;
+	problem.simulate(left.hypothesis, y0);
 	problem.simulate(d.final.hypothesis, y1);
 	problem.mask(r, Rows::train);
-	MatrixXd with(problem.rows(), d.base.jacobian.cols() + 1);
-	with << d.base.jacobian, problem.whiten(y1 - y0);
+	MatrixXd with(problem.rows(), left.jacobian.cols() + 1);
+	with << left.jacobian, problem.whiten(y1 - y0);
 	const MatrixXd columns = whitened(problem, group.columns);
-	auto left = [&](const MatrixXd &shared) {
+	auto rest = [&](const MatrixXd &shared) {
 		Regression regression(problem, shared, columns, r);
 		regression.gram.diagonal().array() += 1e-9;
 		return r.squaredNorm() - regression.right.dot(regression.gram.ldlt().solve(regression.right));
 	};
-	const double n = double(problem.training), alone = left(d.base.jacobian), both = left(with);
-	const double own = double(d.final.slots.size() - d.base.slots.size());
-	return n * std::log(std::fmax(both, 1e-300) / alone) + own * std::log(n) > -limits.evidence ||
-		   alone - both < limits.share * alone;
+	const double n = double(problem.training), alone = rest(left.jacobian), both = rest(with);
+	const double own = double(d.final.slots.size() - left.slots.size());
+	return {-n * std::log(std::fmax(both, 1e-300) / alone) - own * std::log(n), 1 - both / alone};
+}
+
+/* True if the causes have nothing to say that an unknown column does not say better. */
+bool Decider::needless(const Group &group) const
+{
+	const auto [fall, share] = beside(group, d.base);
+	return fall < limits.evidence || share < limits.share;
+}
+
+/* True if a jump is what a smooth course in time looks like to something that can only jump. */
+bool Decider::wanders(const Cause &cause) const
+{
+	if (!has_instants(cause.effect))
+		return false;
+	const std::string clock = problem.domain->signals[tactus_role_signal(problem.domain, TACTUS_ROLE_TIME)].name;
+	return std::any_of(evidence.groups.begin(), evidence.groups.end(), [&](const Group &group) {
+		return group.covariate == clock && beside(group, cause.without).first < limits.evidence;
+	});
 }
 
 /*
@@ -514,6 +536,12 @@ double Decider::bursts(const Fit &fit) const
 
 void Decider::adequacy()
 {
+	const auto wander = std::find_if(d.causes.begin(), d.causes.end(), [&](const Cause &c) { return wanders(c); });
+	const bool wandered = wander != d.causes.end();
+	if (wandered) {
+		d.final = Fit(wander->without);
+		d.causes.erase(wander);
+	}
 	d.left = d.causes.empty() ? d.wrong : map(d.final);
 	d.bursts = bursts(d.final);
 	/* Steps without end are something that changes from stretch to stretch and was not recorded. */
@@ -525,7 +553,7 @@ void Decider::adequacy()
 		return std::any_of(c.rivals.begin(), c.rivals.end(),
 						   [&](const Rival &r) { return r.delta < (1 + limits.outdone) * c.delta - limits.evidence; });
 	});
-	d.structure = !d.left.empty() || d.bursts > 0 || d.steps >= limits.steps || outdone;
+	d.structure = !d.left.empty() || d.bursts > 0 || d.steps >= limits.steps || outdone || wandered;
 	if (d.causes.empty())
 		return;
 	for (const Dependence &dep : d.wrong)
@@ -669,6 +697,8 @@ Decision Decider::run(const std::function<bool(const Hypothesis &)> &rejudge)
 	adequacy();
 	staleness();
 	d.verdict = verdict();
+	d.base.hypothesis = problem.levelled(d.base.hypothesis, Rows::train);
+	d.final.hypothesis = problem.levelled(d.final.hypothesis, Rows::train);
 	return d;
 }
 

@@ -85,7 +85,7 @@ Regression::HeldOut Regression::held_out() const
 	HeldOut best;
 	for (size_t o = 0; o < outputs; o++)
 		if (before[o] > 0 && 1 - after[o] / before[o] > best.share)
-			best = {1 - after[o] / before[o], before[o] - after[o]};
+			best = {1 - after[o] / before[o], before[o] - after[o], o};
 	return best;
 }
 
@@ -99,7 +99,7 @@ MatrixXd whitened(const Problem &problem, const MatrixXd &columns)
 
 Dependence dependence(const Problem &problem, const Fit &fit, const Group &group)
 {
-	Dependence result{&group, 0, 0, 0, 1};
+	Dependence result{&group, 0, 0, 0, 1, 0};
 	VectorXd r = fit.residual;
 	problem.mask(r, Rows::train);
 	const Regression regression(problem, fit.jacobian, whitened(problem, group.columns), r);
@@ -117,6 +117,7 @@ Dependence dependence(const Problem &problem, const Fit &fit, const Group &group
 		const Regression::HeldOut h = regression.held_out();
 		result.whitened = h.share;
 		result.removed = h.removed;
+		result.output = h.output;
 	}
 	return result;
 }

@@ -14,6 +14,7 @@ struct Dependence {
 	double whitened;  /* of the whitened squares, likewise */
 	double removed;   /* those squares */
 	double p_value;
+	size_t output; /* that one */
 };
 
 /* How a group explains what a fit leaves; `whitened` only where the p-value asks for it, `explained` not at all. */
@@ -31,6 +32,7 @@ class Regression
 	/* Squares of r, of the output where a share of them is removed that is largest. */
 	struct HeldOut {
 		double share = 0, removed = 0;
+		size_t output = 0;
 	};
 
 	Regression(const Problem &problem, const MatrixXd &shared, const MatrixXd &own, const VectorXd &r);

@@ -167,6 +167,7 @@ void Diagnosis::explain(Work &work)
 		return;
 	VectorXd y;
 	problem.simulate(plain.hypothesis, y);
+	problem.estimate_blur(y);
 	work.evidence.groups = groups_of(problem, gathered.extras(work), y, work.input_name);
 	work.evidence.base = plain.hypothesis;
 	{
@@ -199,6 +200,7 @@ void Diagnosis::explain(Work &work)
 	work.full = problem.fit(h, Rows::all);
 	if (!work.full.ok)
 		work.full = problem.evaluate(h, Rows::all);
+	work.full.hypothesis = problem.levelled(work.full.hypothesis, Rows::all);
 	const MatrixXd &j = work.full.jacobian;
 	if (j.cols() == 0)
 		return;

@@ -287,6 +287,36 @@ Fit Problem::fit(const Hypothesis &start, Rows which) const
 	return result;
 }
 
+Hypothesis Problem::levelled(const Hypothesis &h, Rows which) const
+{
+	Hypothesis result = h;
+	std::vector<Slot> base = slots(h);
+	base.erase(std::remove_if(base.begin(), base.end(), [](const Slot &slot) { return slot.part >= 0; }), base.end());
+	VectorXd y, r;
+	MatrixXd d;
+	double first = 0;
+	for (int round = 0; round < 2 && !base.empty(); round++) { /* once is enough where it is affine in them */
+		if (!simulate(result, y) || !derivatives(result, y, base, d))
+			return h;
+		r = measured - y;
+		mask(r, which);
+		first = round == 0 ? r.norm() : first;
+		for (Index j = 0; j < d.cols(); j++)
+			mask(d.col(j), which);
+		const VectorXd size = d.colwise().norm().transpose().cwiseMax(1e-300);
+		const VectorXd step = (d * size.cwiseInverse().asDiagonal()).colPivHouseholderQr().solve(r);
+		for (size_t j = 0; j < base.size(); j++) {
+			double &at = value(result, base[j]);
+			at = std::clamp(at + step[Index(j)] / size[Index(j)], base[j].info->lower, base[j].info->upper);
+		}
+	}
+	if (base.empty() || !simulate(result, y))
+		return h;
+	r = measured - y;
+	mask(r, which);
+	return r.norm() < 0.98 * first ? result : h;
+}
+
 MatrixXd Problem::scatter(const MatrixXd &columns, const VectorXd &residual) const
 {
 	MatrixXd gradient = MatrixXd::Zero(block_count, columns.cols());

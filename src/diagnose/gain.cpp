@@ -255,7 +255,7 @@ const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, s
 	gain.rmse_after = rmse(a) * problem.scale[output];
 	gain.reduction = 1 - gain.rmse_after / gain.rmse_before;
 	bootstrap(b, a, seed, &gain.ci95[0], &gain.ci95[1]);
-	const double floor = problem.noise.spread[output] * problem.scale[output];
+	const double floor = problem.floor(output) * problem.scale[output];
 	const double explainable = gain.rmse_before * gain.rmse_before - floor * floor;
 	gain.of_explainable =
 		explainable > 0 ? (gain.rmse_before * gain.rmse_before - gain.rmse_after * gain.rmse_after) / explainable : NAN;

@@ -17,6 +17,7 @@ struct Limits {
 	double completing = 0.7;            /* or of what is left above the noise, where that is little … */
 	double completing_share = 0.15;     /* … but this share of the squares */
 	double outdone = 0.25;              /* of a cause's evidence, by which a rival shows that more is there */
+	double blur = 1.5;                  /* of the squares that the input's noise makes: what smooths it removes them */
 	double less_noise = 0.9;            /* of the noise at first, below which all is decided again */
 	double relative_margin = 0.08;      /* and as a share of what the cause explains: no form is exact */
 	double margin = 10;                 /* over the runner-up, in Schwarz's criterion */

@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "core/core.h"
+#include "diagnose/limits.hpp"
 
 namespace tactus::explain
 {
@@ -392,6 +393,77 @@ std::vector<Slot> Problem::slots(const Hypothesis &h) const
 double &Problem::value(Hypothesis &h, const Slot &slot)
 {
 	return slot.part < 0 ? h.base[slot.index] : h.parts[size_t(slot.part)].value[slot.index];
+}
+
+/* ---- the input's own noise ---- */
+
+/*
+ * A sample of the input less the mean of its neighbours, h, holds its noise ξ and what curvature the load has there.
+ * The readings follow the load and not ξ, so that the same difference of the residual (in units of the input) holds −ξ:
+ * their product is −1.5 times the variance of ξ. A film that smooths fast loads does likewise; but the input is no
+ * noisier than it is in the quietest quarter of the time, and only samples that are as quiet are looked at.
+ */
+void Problem::estimate_blur(const VectorXd &y)
+{
+	input_noise = 0;
+	std::fill_n(blur, TACTUS_OUTPUTS_MAX, 0.0);
+	if (!domain->loaded)
+		return;
+	const VectorXd x = at_rows(input_signal());
+	double slope[TACTUS_OUTPUTS_MAX] = {}, best = 0;
+	for (size_t o = 0; o < output_count; o++) {
+		double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+		std::vector<double> windows;
+		for (const Run &run : runs)
+			for (Index i = run.first; run.output == o && i < run.first + run.count; i++) {
+				n++;
+				sx += x[i];
+				sy += y[i];
+				sxx += x[i] * x[i];
+				sxy += x[i] * y[i];
+				const Index at = i - run.first;
+				if (at % 16 == 0)
+					windows.push_back(0);
+				if (at > 0 && at + 1 < run.count)
+					windows.back() += std::pow(x[i] - (x[i - 1] + x[i + 1]) / 2, 2) / (16 * 1.5);
+			}
+		const double variance = sxx / n - sx / n * (sx / n);
+		slope[o] = variance > 0 ? (sxy / n - sx / n * (sy / n)) / variance : 0;
+		if (!(std::abs(slope[o]) > 0) || windows.size() < 8)
+			continue;
+		std::nth_element(windows.begin(), windows.begin() + long(windows.size() / 4), windows.end());
+		const double quiet = 1.25 * windows[windows.size() / 4], most = 4 * std::sqrt(1.5 * quiet);
+		const VectorXd left = (measured - y) / slope[o];
+		double product = 0, square = 0, count = 0;
+		for (const Run &run : runs)
+			for (Index i = run.first + 1; run.output == o && i + 1 < run.first + run.count; i++) {
+				const double h = x[i] - (x[i - 1] + x[i + 1]) / 2, r = left[i] - (left[i - 1] + left[i + 1]) / 2;
+				if (std::abs(h) > most)
+					continue;
+				product -= r * h / 1.5;
+				square += std::pow(r * h / 1.5, 2);
+				count++;
+			}
+		if (product > 5 * std::sqrt(square))
+			best = std::fmax(best, std::fmin(product / count, quiet));
+	}
+	input_noise = std::sqrt(best);
+	for (size_t o = 0; o < output_count; o++)
+		blur[o] = std::abs(slope[o]) * input_noise;
+}
+
+double Problem::floor(size_t output) const
+{
+	return blur[output] > noise.spread[output] ? std::hypot(blur[output], noise.spread[output]) : noise.spread[output];
+}
+
+double Problem::blurred(size_t output) const
+{
+	double filter = 1;
+	for (const double a : noise.a[output])
+		filter += a * a;
+	const double share = blur[output] / noise.sigma[output];
+	return limits.blur * share * share * filter * double(training_of[output]);
 }
 
 } // namespace tactus::explain

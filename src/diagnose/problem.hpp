@@ -112,6 +112,8 @@ class Problem
 	bool outputs[TACTUS_OUTPUTS_MAX] = {};
 	size_t output_count = 0;
 	Noise noise;
+	/* What the input's own noise does to each output, scaled rms: a reference may be worse than what it calibrates. */
+	double blur[TACTUS_OUTPUTS_MAX] = {}, input_noise = 0;
 	std::vector<char> excluded;     /* per row: an outlier */
 	Index training = 0;             /* rows that train */
 	std::vector<Index> training_of; /* of them, those of each output, which follow one another */
@@ -158,6 +160,17 @@ class Problem
 
 	/* The hypothesis at the least squares of whitened residuals over those rows, from where it stands. */
 	Fit fit(const Hypothesis &start, Rows which) const;
+	/*
+	 * The same with the base parameters that are free at plain least squares: weighted by slow noise they may leave a
+	 * level and a slope that nobody would draw. As it is where that changes little.
+	 */
+	Hypothesis levelled(const Hypothesis &h, Rows which) const;
+	/* Estimates input_noise and blur from the residual at y (scaled): what the input says and the readings do not. */
+	void estimate_blur(const VectorXd &y);
+	/* What cannot be simulated better: an output's noise, the input's where that is larger with it; scaled rms. */
+	double floor(size_t output) const;
+	/* Squares of an output's whitened training rows that are the input's noise and more. */
+	double blurred(size_t output) const;
 	/* Residual and derivatives where it stands, without moving. */
 	Fit evaluate(const Hypothesis &h, Rows which) const;
 	/*

@@ -38,7 +38,7 @@ const tactus_base_error *base_errors(Store &store, const Work &work, size_t *cou
 			result.push_back({store.text(work.output_name[o]), store.text(work.output_unit[o]),
 							  problem.scale[o] * rms_of(problem, o, problem.measured - given),
 							  problem.scale[o] * rms_of(problem, o, problem.measured - refit),
-							  problem.scale[o] * problem.noise.spread[o]});
+							  problem.scale[o] * problem.floor(o)});
 	*count = result.size();
 	return store.keep(std::move(result));
 }
@@ -95,8 +95,8 @@ std::string sentence(const Work &work, const tactus_effect *effect)
 	size_t output = 0;
 	double most = -1;
 	for (size_t o = 0; o < problem.output_count; o++)
-		if (problem.outputs[o] && rms_of(problem, o, moved) / problem.noise.spread[o] > most) {
-			most = rms_of(problem, o, moved) / problem.noise.spread[o];
+		if (problem.outputs[o] && rms_of(problem, o, moved) / problem.floor(o) > most) {
+			most = rms_of(problem, o, moved) / problem.floor(o);
 			output = o;
 		}
 	VectorXd centred = moved;
@@ -106,7 +106,7 @@ std::string sentence(const Work &work, const tactus_effect *effect)
 	if (rms < 1e-6 * rms_of(problem, output, moved)) /* an offset */
 		rms = rms_of(problem, output, moved);
 	char ratio[64];
-	const double times = rms / problem.noise.spread[output];
+	const double times = rms / problem.floor(output);
 	snprintf(ratio, sizeof ratio,
 			 times < 100 ? "%.2g times the noise, %.2g %% of its range" : "%.0f times the noise, %.2g %% of its range",
 			 times, 100 * rms * problem.scale[output] / problem.range[output]);
