@@ -607,9 +607,13 @@ void Decider::staleness()
 				pick = slot;
 			}
 		}
-		if (!best.ok || !(now.cost - best.cost > limits.evidence) ||
-			!(now.square - best.square > limits.share * best.square) ||
-			!(now.square - best.square > 0.02 * (as_is.square - best.square)))
+		bool much = false; /* of what is wrong with an output, which may be little beside another's */
+		for (size_t o = 0; o < problem.output_count; o++) {
+			const double fall = now.square_of[o] - best.square_of[o];
+			much = much ||
+				   (fall > limits.share * best.square_of[o] && fall > 0.02 * (as_is.square_of[o] - best.square_of[o]));
+		}
+		if (!best.ok || !(now.cost - best.cost > limits.evidence) || !much)
 			break;
 		d.moved.slots.push_back(pick);
 		now = best;
@@ -618,12 +622,33 @@ void Decider::staleness()
 		const tactus_twin &twin = problem.domain->twins[i];
 		const bool moved = std::any_of(d.moved.slots.begin(), d.moved.slots.end(),
 									   [&](const Slot &s) { return s.part < 0 && s.index == twin.base; });
-		if (moved && !twin.excluded(problem.segments.front())) {
+		/* A twin moves its own output; where the others moved as well it is the calibration. */
+		const bool alone = std::all_of(d.moved.slots.begin(), d.moved.slots.end(), [&](const Slot &slot) {
+			return slot.info->output == problem.domain->base[twin.base].output;
+		});
+		if (moved && alone && !twin.excluded(problem.segments.front())) {
 			d.moved.rivals.push_back({nullptr, twin.name, now.cost - as_is.cost, false, true, {}});
 			d.moved.separated_by = twin.separated_by;
 		}
 	}
+	/* By plain least squares something must have moved too: what is unlike the model bends a base that slow noise
+	 * weighs. */
+	VectorXd y;
+	auto raw = [&](const Hypothesis &h) {
+		problem.simulate(h, y);
+		VectorXd r = problem.measured - y;
+		problem.mask(r, Rows::train);
+		return r.squaredNorm();
+	};
+	Hypothesis level = now.hypothesis;
+	level.base = fixed.base;
+	level = problem.levelled(level, Rows::train);
+	if (!d.moved.slots.empty() && !(raw(level) < (1 - 0.5 * limits.share) * raw(fixed))) {
+		d.moved = Moved();
+		return;
+	}
 	d.moved.fit = now;
+	d.moved.fit.hypothesis = problem.levelled(now.hypothesis, Rows::train);
 	d.moved.delta = now.cost - as_is.cost;
 	d.stale = !d.moved.slots.empty();
 	if (!d.stale)
