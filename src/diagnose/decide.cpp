@@ -165,6 +165,7 @@ class Decider
 	void settle();
 	double added(const double *variance) const;
 	void imprints();
+	void strays();
 	void adequacy();
 	void staleness();
 	std::pair<double, double> beside(const Group &group, const Fit &left) const;
@@ -534,6 +535,26 @@ double Decider::bursts(const Fit &fit) const
 	return largest / second;
 }
 
+/* More than noise without a column that shows what: the noise was judged beside more functions than are mapped. */
+void Decider::strays()
+{
+	VectorXd y;
+	problem.simulate(problem.levelled(d.base.hypothesis, Rows::train), y);
+	VectorXd raw = problem.measured - y;
+	problem.mask(raw, Rows::train);
+	std::vector<double> square(problem.output_count, 0);
+	for (const Run &run : problem.runs)
+		square[run.output] += raw.segment(run.first, run.count).squaredNorm();
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const double times = std::sqrt(square[o] / std::fmax(double(problem.training_of[o]), 1)) / problem.floor(o);
+		if (problem.outputs[o] && times > std::fmax(limits.stray, d.stray)) {
+			d.stray = times;
+			d.stray_output = o;
+		}
+	}
+	d.structure = d.stray > 0;
+}
+
 void Decider::adequacy()
 {
 	const auto wander = std::find_if(d.causes.begin(), d.causes.end(), [&](const Cause &c) { return wanders(c); });
@@ -554,8 +575,11 @@ void Decider::adequacy()
 						   [&](const Rival &r) { return r.delta < (1 + limits.outdone) * c.delta - limits.evidence; });
 	});
 	d.structure = !d.left.empty() || d.bursts > 0 || d.steps >= limits.steps || outdone || wandered;
-	if (d.causes.empty())
+	if (d.causes.empty()) {
+		if (!d.structure)
+			strays();
 		return;
+	}
 	for (const Dependence &dep : d.wrong)
 		if (dep.group->unknown && needless(*dep.group)) {
 			d.causes.clear();

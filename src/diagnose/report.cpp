@@ -321,6 +321,10 @@ const tactus_dependence *unexplained(Store &store, const Work &work, const std::
 	const tactus_dependence *list = describe(store, work, d.left, d.final);
 	for (size_t i = 0; i < d.left.size(); i++)
 		result.push_back(list[i]);
+	if (d.stray > 0)
+		result.push_back({"time_s", 1 - 1 / (d.stray * d.stray), 0,
+						  store.format("%s strays from the simulation by %.1f times its noise, and no column shows why",
+									   work.output_name[d.stray_output].c_str(), d.stray)});
 	if (d.steps >= limits.steps)
 		result.push_back(
 			{"time_s", 0, 0,
