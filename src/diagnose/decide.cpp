@@ -168,9 +168,8 @@ class Decider
 	void strays();
 	void adequacy();
 	void staleness();
-	std::pair<double, double> beside(const Group &group, const Fit &left) const;
 	bool needless(const Group &group) const;
-	bool wanders(const Cause &cause) const;
+	double wandering(const Cause &cause) const;
 	double bursts(const Fit &fit) const;
 	std::vector<Dependence> map(const Fit &fit) const;
 	enum tactus_verdict verdict() const;
@@ -473,42 +472,46 @@ std::vector<Dependence> Decider::map(const Fit &fit) const
 	return found;
 }
 
-/* How much the criterion falls, and by what share the squares, when what was found joins a group beside `left`. */
-std::pair<double, double> Decider::beside(const Group &group, const Fit &left) const
+/* True if the causes have nothing to say that an unknown column does not say better. */
+bool Decider::needless(const Group &group) const
 {
-	VectorXd y0, y1, r = left.residual;
-	problem.simulate(left.hypothesis, y0);
+	VectorXd y0, y1, r = d.base.residual;
+	problem.simulate(d.base.hypothesis, y0);
 	problem.simulate(d.final.hypothesis, y1);
 	problem.mask(r, Rows::train);
-	MatrixXd with(problem.rows(), left.jacobian.cols() + 1);
-	with << left.jacobian, problem.whiten(y1 - y0);
+	MatrixXd with(problem.rows(), d.base.jacobian.cols() + 1);
+	with << d.base.jacobian, problem.whiten(y1 - y0);
 	const MatrixXd columns = whitened(problem, group.columns);
-	auto rest = [&](const MatrixXd &shared) {
+	auto left = [&](const MatrixXd &shared) {
 		Regression regression(problem, shared, columns, r);
 		regression.gram.diagonal().array() += 1e-9;
 		return r.squaredNorm() - regression.right.dot(regression.gram.ldlt().solve(regression.right));
 	};
-	const double n = double(problem.training), alone = rest(left.jacobian), both = rest(with);
-	const double own = double(d.final.slots.size() - left.slots.size());
-	return {-n * std::log(std::fmax(both, 1e-300) / alone) - own * std::log(n), 1 - both / alone};
+	const double n = double(problem.training), alone = left(d.base.jacobian), both = left(with);
+	const double own = double(d.final.slots.size() - d.base.slots.size());
+	return n * std::log(std::fmax(both, 1e-300) / alone) + own * std::log(n) > -limits.evidence ||
+		   alone - both < limits.share * alone;
 }
 
-/* True if the causes have nothing to say that an unknown column does not say better. */
-bool Decider::needless(const Group &group) const
-{
-	const auto [fall, share] = beside(group, d.base);
-	return fall < limits.evidence || share < limits.share;
-}
-
-/* True if a jump is what a smooth course in time looks like to something that can only jump. */
-bool Decider::wanders(const Cause &cause) const
+/*
+ * Share of what is left that a cause with jumps explains, if it is none: something that wanders is approached by jumps,
+ * but they neither explain nearly all of it nor foretell blocks that the fit has not seen as those of a true one do.
+ */
+double Decider::wandering(const Cause &cause) const
 {
 	if (!has_instants(cause.effect))
-		return false;
-	const std::string clock = problem.domain->signals[tactus_role_signal(problem.domain, TACTUS_ROLE_TIME)].name;
-	return std::any_of(evidence.groups.begin(), evidence.groups.end(), [&](const Group &group) {
-		return group.covariate == clock && beside(group, cause.without).first < limits.evidence;
-	});
+		return 0;
+	auto rest = [&](const Hypothesis &h) {
+		VectorXd y;
+		problem.simulate(problem.levelled(h, Rows::train), y);
+		y = problem.measured - y;
+		problem.mask(y, Rows::train);
+		return y.squaredNorm();
+	};
+	const double share = 1 - rest(d.final.hypothesis) / rest(cause.without.hypothesis);
+	const bool foretold =
+		paired(problem, problem.held_out(cause.without), problem.held_out(d.final)) > limits.jump_foretold;
+	return share < limits.jump_whole && !foretold ? std::fmax(share, 1e-3) : 0;
 }
 
 /*
@@ -557,12 +560,13 @@ void Decider::strays()
 
 void Decider::adequacy()
 {
-	const auto wander = std::find_if(d.causes.begin(), d.causes.end(), [&](const Cause &c) { return wanders(c); });
-	const bool wandered = wander != d.causes.end();
-	if (wandered) {
-		d.final = Fit(wander->without);
-		d.causes.erase(wander);
-	}
+	for (size_t i = 0; i < d.causes.size(); i++)
+		if (const double share = wandering(d.causes[i]); share > 0) {
+			d.wander = share;
+			d.final = Fit(d.causes[i].without);
+			d.causes.erase(d.causes.begin() + long(i));
+			break;
+		}
 	d.left = d.causes.empty() ? d.wrong : map(d.final);
 	d.bursts = bursts(d.final);
 	/* Steps without end are something that changes from stretch to stretch and was not recorded. */
@@ -574,7 +578,7 @@ void Decider::adequacy()
 		return std::any_of(c.rivals.begin(), c.rivals.end(),
 						   [&](const Rival &r) { return r.delta < (1 + limits.outdone) * c.delta - limits.evidence; });
 	});
-	d.structure = !d.left.empty() || d.bursts > 0 || d.steps >= limits.steps || outdone || wandered;
+	d.structure = !d.left.empty() || d.bursts > 0 || d.steps >= limits.steps || outdone || d.wander > 0;
 	if (d.causes.empty()) {
 		if (!d.structure)
 			strays();

@@ -48,8 +48,9 @@ struct Decision {
 	std::vector<Dependence> wrong, left;
 	Moved moved;
 	bool stale = false, structure = false;
-	size_t steps = 0; /* instants among the causes */
-	double stray = 0; /* of what nothing shows, times the noise of an output; 0: it is as large as noise is */
+	size_t steps = 0;  /* instants among the causes */
+	double wander = 0; /* share of what was left that jumps explain which are none; 0: there were none */
+	double stray = 0;  /* of what nothing shows, times the noise of an output; 0: it is as large as noise is */
 	size_t stray_output = 0;
 	double bursts = 0; /* share of what is left that a fiftieth of the readings hold; 0: they are as noise is */
 };

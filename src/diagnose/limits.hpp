@@ -28,8 +28,10 @@ struct Limits {
 	double half = 0.5;                  /* of what could be explained, that causes must explain to be named */
 	double hopeless = 0.4;              /* of the best evidence, below which a candidate is not fitted */
 	double far = 0.85;                  /* of a cause's evidence, below which a rival need not lose block by block */
-	double stray = 1.4;                 /* times the noise: more is not noise, whatever it is */
-	double tails = 5;                   /* kurtosis of whitened readings above which they come in bursts */
+	double jump_whole = 0.9, jump_foretold = 5; /* of what is left that a jump explains, else `paired` of it: it may be
+												   something that wanders */
+	double stray = 1.4;                         /* times the noise: more is not noise, whatever it is */
+	double tails = 5;                           /* kurtosis of whitened readings above which they come in bursts */
 	size_t causes = 5, tried = 4;
 	size_t steps = 3; /* instants from which on they look like something that was not recorded */
 };

@@ -321,6 +321,12 @@ const tactus_dependence *unexplained(Store &store, const Work &work, const std::
 	const tactus_dependence *list = describe(store, work, d.left, d.final);
 	for (size_t i = 0; i < d.left.size(); i++)
 		result.push_back(list[i]);
+	if (d.wander > 0)
+		result.push_back(
+			{"time_s", d.wander, 0,
+			 store.format("jumps explain %.0f %% of it, but do not foretell stretches that were not fitted: something "
+						  "wanders that no column records",
+						  100 * d.wander)});
 	if (d.stray > 0)
 		result.push_back({"time_s", 1 - 1 / (d.stray * d.stray), 0,
 						  store.format("%s strays from the simulation by %.1f times its noise, and no column shows why",
