@@ -157,7 +157,9 @@ ForceErrors force_errors(const Work &work, const Hypothesis &h)
 			sample.drive_V = value(SENSOR_DRIVE, i, NAN);
 			sample.temperature_degC = value(SENSOR_TEMPERATURE, i, NAN);
 			sample.frequency_Hz = value(SENSOR_FREQUENCY, i, NAN);
-			sample.sequence = i;
+			/* Readings of one scan are of one load, as `force` has it. */
+			const double scan = work.sequence[segment] ? work.sequence[segment][s->row[i * work.every]] : NAN;
+			sample.sequence = scan >= 0 ? uint64_t(scan) : i;
 			sample.channel = work.channel;
 			sample.ac = value(SENSOR_FREQUENCY, i, 0) > 0;
 			tactus_force force;

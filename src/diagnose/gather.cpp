@@ -240,6 +240,7 @@ void Gathered::prepare(Work &work)
 	work.thinned.reserve(members[at].size());
 	for (const auto &[k, c] : members[at]) {
 		const Recording &r = recordings[k];
+		work.sequence.push_back(tactus_table_numbers(r.table, "sequence"));
 		if (work.every == 1) {
 			segments.push_back(&r.series[c]);
 			use.push_back(r.use[c]);

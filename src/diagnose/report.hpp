@@ -59,6 +59,8 @@ struct Work {
 	int channel = 0;                    /* in models: 1 where the whole recording is one series */
 	std::vector<tactus_series> thinned; /* own copies where the recording is longer than is looked at */
 	std::vector<std::vector<double>> buffers;
+	std::vector<const double *>
+		sequence; /* per segment: the recording's scans by row, NULL if it does not number them */
 	std::unique_ptr<Problem> problem;
 	Evidence evidence;
 	Hypothesis given;

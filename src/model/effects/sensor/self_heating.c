@@ -52,6 +52,12 @@ static const char *testable(const tactus_series *series)
 			   : "drive_V never changes";
 }
 
+/* What has warmed within one sample follows the drive itself. */
+static const char *alike(const tactus_series *series, const double *p)
+{
+	return p[TIME_CONSTANT] < series->dt ? "voltage-dependence" : NULL;
+}
+
 static const tactus_search searches[] = {{TIME_CONSTANT, TACTUS_SEARCH_TIME, 0, {0}}};
 
 const struct tactus_effect tactus_effect_sensor_self_heating = {
@@ -71,4 +77,5 @@ const struct tactus_effect tactus_effect_sensor_self_heating = {
 	.process = process,
 	TACTUS_SEARCHES(searches),
 	.testable = testable,
+	.alike = alike,
 };
