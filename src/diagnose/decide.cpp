@@ -170,7 +170,6 @@ class Decider
 	void staleness();
 	bool needless(const Group &group) const;
 	double wandering(const Cause &cause) const;
-	double bursts(const Fit &fit) const;
 	std::vector<Dependence> map(const Fit &fit) const;
 	enum tactus_verdict verdict() const;
 
@@ -514,30 +513,6 @@ double Decider::wandering(const Cause &cause) const
 	return share < limits.jump_whole && !foretold ? std::fmax(share, 1e-3) : 0;
 }
 
-/*
- * Noise that is Gaussian where nothing happens and large in some stretches is none: the share of the squares that the
- * 2 % largest whitened readings hold, 0 if their kurtosis is that of noise.
- */
-double Decider::bursts(const Fit &fit) const
-{
-	std::vector<double> squares;
-	for (Index i = 0; i < problem.rows(); i++)
-		if (problem.trains(i, Rows::train))
-			squares.push_back(fit.residual[i] * fit.residual[i]);
-	double second = 0, fourth = 0, largest = 0;
-	for (const double s : squares) {
-		second += s;
-		fourth += s * s;
-	}
-	const double n = double(squares.size()), kurtosis = n * fourth / (second * second);
-	if (!(kurtosis > limits.tails) || (kurtosis - 3) / std::sqrt(24 / n) < 12)
-		return 0;
-	std::sort(squares.rbegin(), squares.rend());
-	for (size_t i = 0; i < squares.size() / 50 + 1; i++)
-		largest += squares[i];
-	return largest / second;
-}
-
 /* More than noise without a column that shows what: the noise was judged beside more functions than are mapped. */
 void Decider::strays()
 {
@@ -568,7 +543,8 @@ void Decider::adequacy()
 			break;
 		}
 	d.left = d.causes.empty() ? d.wrong : map(d.final);
-	d.bursts = bursts(d.final);
+	d.bursts = find_bursts(problem, d.final, evidence.groups);
+	d.swing = find_swing(problem, d.final.hypothesis, evidence.groups);
 	/* Steps without end are something that changes from stretch to stretch and was not recorded. */
 	d.steps = size_t(std::count_if(d.final.slots.begin(), d.final.slots.end(), [&](const Slot &slot) {
 		return slot.part >= 0 && instant(d.final.hypothesis.parts[size_t(slot.part)].effect, slot.index);
@@ -578,7 +554,8 @@ void Decider::adequacy()
 		return std::any_of(c.rivals.begin(), c.rivals.end(),
 						   [&](const Rival &r) { return r.delta < (1 + limits.outdone) * c.delta - limits.evidence; });
 	});
-	d.structure = !d.left.empty() || d.bursts > 0 || d.steps >= limits.steps || outdone || d.wander > 0;
+	d.structure =
+		!d.left.empty() || d.bursts > 0 || d.swing.share > 0 || d.steps >= limits.steps || outdone || d.wander > 0;
 	if (d.causes.empty()) {
 		if (!d.structure)
 			strays();

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "diagnose/dependence.hpp"
+#include "diagnose/left.hpp"
 #include "diagnose/screen.hpp"
 
 namespace tactus::explain
@@ -53,6 +54,7 @@ struct Decision {
 	double stray = 0;  /* of what nothing shows, times the noise of an output; 0: it is as large as noise is */
 	size_t stray_output = 0;
 	double bursts = 0; /* share of what is left that a fiftieth of the readings hold; 0: they are as noise is */
+	Swing swing;
 };
 
 /* What a decision rests on beside the problem. */

@@ -227,6 +227,10 @@ void Diagnosis::explain(Work &work)
 		const double square = std::fmax(covariance(k, k) * variance, disagreement(k, k));
 		work.errors.push_back(known ? std::sqrt(std::fmax(square, 0)) / size[k] : NAN);
 	}
+	/* An autoregression takes a swing for noise, and of what stands at the edge of a line it makes any size. */
+	for (size_t o = 0; o < problem.output_count; o++)
+		if (d.swing.floor[o] > 0)
+			problem.noise.spread[o] = d.swing.floor[o];
 }
 
 /* The gravest verdict of the series is that of the whole. */

@@ -31,7 +31,21 @@ struct Limits {
 	double jump_whole = 0.9, jump_foretold = 5; /* of what is left that a jump explains, else `paired` of it: it may be
 												   something that wanders */
 	double stray = 1.4;                         /* times the noise: more is not noise, whatever it is */
-	double tails = 5;                           /* kurtosis of whitened readings above which they come in bursts */
+	double tails = 5;                           /* kurtosis of whitened readings above which they may come in bursts */
+	double burst_score = 3.3;                   /* standard errors that they must stand together more than by chance */
+	double burst_least = 0.01;                  /* of the mean square, below which all are as small */
+	long burst_after = 2, burst_before = 10;    /* rows after a large one, and before it, that are looked at */
+	size_t burst_rows = 100;                    /* that a recording must have */
+	/* Swings in what is left, by its spectrum: */
+	double swing_power = 25, swing_edge = 4; /* times what noise can be there, and where a swing then ends */
+	double swing_share = 0.1;                /* of the squares that it must be */
+	double swing_width = 0.08;               /* of all frequencies that it may take: more are a filter's band */
+	double swing_steady = 0.1;               /* of its frequency, width below which it is one frequency */
+	double swing_load = 0.02;                /* of the load's squares there, above which the load does the same */
+	double swing_gap = 10;                   /* times the mean step, a gap above which rows are counted instead */
+	long swing_turns = 3;                    /* in a recording, below which it is a drift */
+	long swing_smooth = 12;                  /* frequencies either side that noise is averaged over */
+	long swing_rows = 200;                   /* in a recording at least */
 	size_t causes = 5, tried = 4;
 	size_t steps = 3; /* instants from which on they look like something that was not recorded */
 };

@@ -336,6 +336,8 @@ const tactus_dependence *unexplained(Store &store, const Work &work, const std::
 			{"time_s", 0, 0,
 			 store.format("%zu steps were needed: something changes from stretch to stretch that no column records",
 						  d.steps)});
+	if (d.swing.share > 0)
+		result.push_back({"time_s", d.swing.share, 0, swing_in_words(store, work, d.swing)});
 	if (d.bursts > 0)
 		result.push_back(
 			{"time_s", d.bursts, 0,

@@ -80,6 +80,7 @@ std::string unit_of(const Work &work, const char *unit);
 std::string quantity(double value, const std::string &unit);
 
 const tactus_dependence *describe(Store &store, const Work &work, const std::vector<Dependence> &list, const Fit &fit);
+const char *swing_in_words(Store &store, const Work &work, const Swing &swing);
 const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, std::vector<double> *per_cause,
 								std::vector<double> *per_cause_low, std::vector<double> *per_cause_high);
 const tactus_experiment *propose(Store &store, const Work &work, const char *device);

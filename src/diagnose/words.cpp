@@ -189,4 +189,18 @@ const tactus_dependence *describe(Store &store, const Work &work, const std::vec
 	return store.keep(std::move(result));
 }
 
+const char *swing_in_words(Store &store, const Work &work, const Swing &swing)
+{
+	std::string often = quantity(1 / swing.frequency, swing.clock ? "s" : "readings");
+	if (!swing.clock)
+		often = (swing.steady ? "once in " : "once in about ") + often;
+	else if (swing.steady)
+		often = "at " + quantity(swing.frequency, "Hz");
+	else
+		often = "about every " + often;
+	return store.format("%s %s %s%s: %.0f %% of what is left", work.output_name[swing.output].c_str(),
+						swing.steady ? "swings" : "wanders to and fro", often.c_str(),
+						swing.with_load ? "" : ", whatever the load", 100 * swing.share);
+}
+
 } // namespace tactus::explain
