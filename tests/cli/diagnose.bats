@@ -595,6 +595,73 @@ made() {
 	jq -e '.series[0] | .structure_remains and any(.unexplained[].text; test("may help or harm"))' said.json
 }
 
+# A recording on standard output: loads held for random times, and what Python says of the noise e in newtons.
+left_over() {
+	NOISE=$1 SEED=${2:-1} "$PYTHON" - <<-'EOP'
+		import os, textwrap
+		import numpy as np
+		rng = np.random.default_rng(int(os.environ["SEED"]))
+		n = 3000
+		t = np.arange(n) * 0.1
+		load = np.repeat(rng.uniform(0, 100, 60) * (rng.random(60) > 0.25), n // 60)
+		load = np.convolve(np.pad(load, 5, mode="edge"), np.ones(11) / 11, "valid")
+		white = rng.standard_normal(n)
+		exec(textwrap.dedent(os.environ["NOISE"]))
+		print("time_s,force_N,conductance_S")
+		for row in zip(t, load, 1e-7 + 4e-7 * (load + e)):
+		    print("%.6g,%.8g,%.8g" % row)
+	EOP
+}
+
+@test "a steady swing is no noise, however well an autoregression foretells it; the frequency is said" {
+	left_over "e = 0.1 * (200 * np.sin(2 * np.pi * 2.3 * t) + white)" >sine.csv
+	tactus diagnose sine.csv --json >said.json
+	contract <said.json
+	jq -e '.verdict == "unexplained" and (.series[0].unexplained[0] | .covariate == "time_s" and .explained > 0.9 and
+		(.text | test("conductance_S swings at 2.3 Hz, whatever the load")))' said.json
+	jq -e '.series[0].base[0] | .rmse > 20 * .noise_floor and .noise_floor < 2e-7' said.json
+	# noise that is foretold as well, but has no line
+	left_over "
+		e = np.zeros(n)
+		for i in range(1, n):
+		    e[i] = 0.97 * e[i - 1] + 0.24 * white[i]
+		" >coloured.csv
+	tactus diagnose coloured.csv --json | jq -e '.verdict == "nothing-wrong"'
+}
+
+@test "an offset that wanders to and fro eight times is not nothing" {
+	left_over "
+		f = np.fft.rfftfreq(n) * n
+		e = np.fft.irfft(np.fft.rfft(white) * np.where(f > 0, np.exp(-((f / 8) ** 2) / 2), 0), n)
+		e = 3 * e / e.std() + 0.3 * rng.standard_normal(n)" >wander.csv
+	tactus diagnose wander.csv --json >said.json
+	jq -e '.verdict != "nothing-wrong"' said.json
+	jq -e 'any(.series[0].unexplained[].text; test("wanders to and fro about every [0-9.]+ s"))' said.json
+}
+
+@test "the mains, where they are the cause, are named and no swing is left" {
+	left_over "
+		t = np.arange(n) * 0.0031
+		e = 3 * np.sin(2 * np.pi * 50 * t) + 0.3 * white" >hum.csv
+	tactus diagnose hum.csv --json | jq -e '.series[0] | [.causes[].effect] == ["mains-hum"] and
+		(.structure_remains | not)'
+}
+
+@test "heavy tails, and noise that grows with the load, are noise and no bursts" {
+	for seed in 1 2 3; do
+		left_over "e = 0.5 * rng.standard_t(4, n)" $seed >tails.csv
+		tactus diagnose tails.csv --json | jq -e '.verdict == "nothing-wrong"'
+		left_over "e = white * (0.003 + 0.01 * load)" $seed >grows.csv
+		tactus diagnose grows.csv --json | jq -e '.verdict == "nothing-wrong"'
+	done
+}
+
+@test "noise that is large in some stretches comes in bursts" {
+	left_over "e = 0.2 * white * np.where(np.arange(n) % 500 < 30, 10, 1)" >bursts.csv
+	tactus diagnose bursts.csv --json >said.json
+	jq -e '.verdict == "unexplained" and any(.series[0].unexplained[].text; test("comes in bursts"))' said.json
+}
+
 @test "colour on a terminal, but not with NO_COLOR" {
 	type script >/dev/null || skip "script(1) is not installed"
 	TERM=xterm script -qec "tactus diagnose $creep" /dev/null >on
