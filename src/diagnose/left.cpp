@@ -8,7 +8,6 @@
 #include <unsupported/Eigen/FFT>
 
 #include "diagnose/limits.hpp"
-#include "diagnose/noise.hpp"
 
 namespace tactus::explain
 {
@@ -160,23 +159,65 @@ Excess excess_of(const std::vector<double> &p)
 	return found;
 }
 
+/*
+ * Without what the groups say, by plain least squares: the noise that was judged may itself be the swing, and weighted
+ * by it a regression makes more of it.
+ */
+VectorXd unsaid(const Problem &problem, const VectorXd &raw, const std::vector<Group> &groups)
+{
+	VectorXd left = raw;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		std::vector<std::pair<Index, Index>> pieces;
+		Index n = 0, at = 0;
+		for (const Run &run : problem.runs)
+			if (run.output == o) {
+				pieces.emplace_back(run.first, run.count);
+				n += run.count;
+			}
+		std::vector<VectorXd> columns(1, VectorXd::Ones(n) / std::sqrt(double(std::max<Index>(n, 1))));
+		for (const Group &group : groups)
+			for (Index j = 0; n > 0 && j < group.columns.cols(); j++, at = 0) {
+				VectorXd column(n);
+				for (const auto &[first, count] : pieces) {
+					column.segment(at, count) = group.columns.col(j).segment(first, count);
+					at += count;
+				}
+				if (column.norm() > 0)
+					columns.push_back(column / column.norm());
+			}
+		MatrixXd z(n, Index(columns.size()));
+		VectorXd r(n);
+		for (size_t j = 0; j < columns.size(); j++)
+			z.col(Index(j)) = columns[j];
+		for (const auto &[first, count] : pieces) {
+			r.segment(at, count) = raw.segment(first, count);
+			at += count;
+		}
+		MatrixXd gram = z.transpose() * z;
+		gram.diagonal().array() += 1e-6;
+		r -= z * gram.ldlt().solve(z.transpose() * r);
+		at = 0;
+		for (const auto &[first, count] : pieces) {
+			left.segment(first, count) = r.segment(at, count);
+			at += count;
+		}
+	}
+	return left;
+}
+
 } // namespace
 
 Swing find_swing(const Problem &problem, const Hypothesis &h, const std::vector<Group> &groups)
 {
 	Swing swing;
-	VectorXd y, left;
+	VectorXd y;
 	if (!problem.simulate(h, y))
 		return swing;
-	Saturated::Columns columns;
-	for (const Group &group : groups)
-		for (Index j = 0; j < group.columns.cols(); j++)
-			columns.emplace_back(group.columns.col(j).data(), group.columns.rows());
-	Saturated(problem, columns).judge(y, {}, left);
 	const VectorXd x = problem.at_rows(problem.input_signal());
 	VectorXd raw = problem.measured - y;
 	for (Index i = 0; i < raw.size(); i++)
 		raw[i] = problem.excluded[size_t(i)] ? 0 : raw[i];
+	const VectorXd left = unsaid(problem, raw, groups);
 	struct Sums {
 		double swing = 0, all = 0, rows = 0;
 		double share() const

@@ -198,9 +198,9 @@ const char *swing_in_words(Store &store, const Work &work, const Swing &swing)
 		often = "at " + quantity(swing.frequency, "Hz");
 	else
 		often = "about every " + often;
-	return store.format("%s %s %s%s: %.0f %% of what is left", work.output_name[swing.output].c_str(),
+	return store.format("%s %s %s%s", work.output_name[swing.output].c_str(),
 						swing.steady ? "swings" : "wanders to and fro", often.c_str(),
-						swing.with_load ? "" : ", whatever the load", 100 * swing.share);
+						swing.with_load ? "" : ", whatever the load");
 }
 
 } // namespace tactus::explain
