@@ -495,6 +495,7 @@ bool Decider::needless(const Group &group) const
 /*
  * Share of what is left that a cause with jumps explains, if it is none: something that wanders is approached by jumps,
  * but they neither explain nearly all of it nor foretell blocks that the fit has not seen as those of a true one do.
+ * Beside another cause they may have to share.
  */
 double Decider::wandering(const Cause &cause) const
 {
@@ -535,13 +536,10 @@ void Decider::strays()
 
 void Decider::adequacy()
 {
-	for (size_t i = 0; i < d.causes.size(); i++)
-		if (const double share = wandering(d.causes[i]); share > 0) {
-			d.wander = share;
-			d.final = Fit(d.causes[i].without);
-			d.causes.erase(d.causes.begin() + long(i));
-			break;
-		}
+	if (d.causes.size() == 1 && (d.wander = wandering(d.causes.front())) > 0) {
+		d.causes.clear();
+		d.final = d.base;
+	}
 	d.left = d.causes.empty() ? d.wrong : map(d.final);
 	d.bursts = find_bursts(problem, d.final, evidence.groups);
 	d.swing = find_swing(problem, d.final.hypothesis, evidence.groups);
