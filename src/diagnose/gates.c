@@ -75,15 +75,20 @@ const double *tactus_gate_time(const tactus_series *series)
 	return NULL;
 }
 
+const char *tactus_gate_row(const tactus_table *recording, size_t row, double time_s, char text[TACTUS_GATE_TEXT])
+{
+	size_t line = tactus_table_line(recording, row);
+	int length = snprintf(text, TACTUS_GATE_TEXT, "%s %zu", line ? "line" : "row", line ? line : row);
+	if (isfinite(time_s))
+		snprintf(text + length, TACTUS_GATE_TEXT - (size_t)length, " (%.6g s)", time_s);
+	return text;
+}
+
 const char *tactus_gate_place(const tactus_table *recording, const tactus_series *series, size_t sample,
 							  char text[TACTUS_GATE_TEXT])
 {
 	const double *time = tactus_gate_time(series);
-	size_t line = tactus_table_line(recording, series->row[sample]);
-	int length = snprintf(text, TACTUS_GATE_TEXT, "%s %zu", line ? "line" : "row", line ? line : series->row[sample]);
-	if (time && isfinite(time[sample]))
-		snprintf(text + length, TACTUS_GATE_TEXT - (size_t)length, " (%.6g s)", time[sample]);
-	return text;
+	return tactus_gate_row(recording, series->row[sample], time ? time[sample] : NAN, text);
 }
 
 const double *tactus_gate_switches(const tactus_series *series)

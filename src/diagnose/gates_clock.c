@@ -124,12 +124,11 @@ static int make_steps(const tactus_table *recording, const tactus_series *series
 
 /* ---- what is wrong with them ---- */
 
-enum { GAPS, STOPS, LOST, KINDS };
+enum { GAPS, STOPS, KINDS };
 
 typedef struct {
 	tactus_gate_found found[KINDS];
 	size_t steps, back;       /* all; stops in which the time goes back */
-	size_t lost_scans;        /* in the gaps of the sequence */
 	double longest, median_s; /* gap and median, s */
 } timing;
 
@@ -164,10 +163,6 @@ static void judge_steps(const steps *of, const tactus_series *series, timing *t)
 		if (of->s[k] / scans_of(of, k) > GAP * of->s_median) {
 			tactus_gate_note(&t->found[GAPS], series, of->at[k]);
 			t->longest = fmax(t->longest, of->s[k]);
-		}
-		if (scans_of(of, k) > 1.5) {
-			tactus_gate_note(&t->found[LOST], series, of->at[k]);
-			t->lost_scans += (size_t)fmin(1e15, round(scans_of(of, k)) - 1);
 		}
 	}
 	bool pattern = (double)t->found[GAPS].count > PATTERN * (double)of->n + 1 || recurs(of);
@@ -209,24 +204,9 @@ static int say_stops(const timing *t, const tactus_table *recording, const tactu
 						   tactus_gate_place(recording, series, t->found[STOPS].first, place));
 }
 
-static int say_lost(const timing *t, const tactus_table *recording, const tactus_series *series, int channel,
-					const char *of, tactus_gate_problems *problems)
-{
-	char place[TACTUS_GATE_TEXT];
-	if (!t->found[LOST].count)
-		return TACTUS_OK;
-	double share = 100 * (double)t->lost_scans / (double)(t->lost_scans + t->steps + 1);
-	return tactus_gate_add(problems, "lost-scans", channel, false, t->found[LOST].row,
-						   tactus_gate_listed(&t->found[LOST]),
-						   "%ssequence skips %zu scans (%.2g %%) in %zu places, first before %s: they were lost on "
-						   "the way; scan slower if effects of seconds matter",
-						   of, t->lost_scans, share, t->found[LOST].count,
-						   tactus_gate_place(recording, series, t->found[LOST].first, place));
-}
-
 typedef int say(const timing *t, const tactus_table *recording, const tactus_series *series, int channel,
 				const char *of, tactus_gate_problems *problems);
-static say *const sentences[KINDS] = {[GAPS] = say_gaps, [STOPS] = say_stops, [LOST] = say_lost};
+static say *const sentences[KINDS] = {[GAPS] = say_gaps, [STOPS] = say_stops};
 
 /* Once for the recording where all channels have the same, else for every channel that has it. */
 static int say_kind(const timing *t, int kind, const tactus_table *recording, const tactus_series *series, size_t count,
@@ -245,6 +225,85 @@ static int say_kind(const timing *t, int kind, const tactus_table *recording, co
 	return status;
 }
 
+/* ---- scans that no row has ---- */
+
+typedef struct {
+	double sequence;
+	size_t row;
+} scan;
+
+static int by_sequence(const void *a, const void *b)
+{
+	const scan *p = a, *q = b;
+	return p->sequence != q->sequence ? (p->sequence > q->sequence) - (p->sequence < q->sequence)
+									  : (p->row > q->row) - (p->row < q->row);
+}
+
+/* The scans that have a row, in order, each with its first; returns how many. */
+static size_t list_scans(const double *sequence, size_t rows, scan *scans)
+{
+	size_t n = 0, count = 0;
+	for (size_t i = 0; i < rows; i++)
+		if (isfinite(sequence[i]))
+			scans[n++] = (scan){sequence[i], i};
+	qsort(scans, n, sizeof *scans, by_sequence);
+	for (size_t k = 0; k < n; k++)
+		if (!count || scans[k].sequence != scans[count - 1].sequence)
+			scans[count++] = scans[k];
+	return count;
+}
+
+static int say_lost(const tactus_table *recording, const scan *scans, size_t count, double usual,
+					tactus_gate_problems *problems)
+{
+	const double *time = tactus_table_numbers(recording, "time_s");
+	size_t places = 0, listed[TACTUS_GATE_ROWS];
+	double lost = 0;
+	for (size_t k = 1; k < count; k++) {
+		double taken = (scans[k].sequence - scans[k - 1].sequence) / usual;
+		if (taken <= 1.5)
+			continue;
+		if (places < TACTUS_GATE_ROWS)
+			listed[places] = scans[k].row;
+		places++;
+		lost += round(taken) - 1;
+	}
+	if (!places)
+		return TACTUS_OK;
+	char place[TACTUS_GATE_TEXT];
+	return tactus_gate_add(problems, "lost-scans", 0, false, listed, places,
+						   "sequence skips %.0f scan%s (%.2g %%) in %zu place%s, first before %s: lost on the way; "
+						   " scan slower if effects of seconds matter",
+						   lost, lost == 1 ? "" : "s", 100 * lost / (lost + (double)count), places,
+						   places == 1 ? "" : "s",
+						   tactus_gate_row(recording, listed[0], time ? time[listed[0]] : NAN, place));
+}
+
+/*
+ * A lost scan has no row at all: a series that does not use every row (dc and ac in turn, an empty reading) has not
+ * lost those between. So all rows of the recording count, in the order of their numbers.
+ */
+static int judge_lost(const tactus_table *recording, tactus_gate_problems *problems)
+{
+	const double *sequence = tactus_table_numbers(recording, "sequence");
+	size_t rows = tactus_table_rows(recording);
+	if (!sequence)
+		return TACTUS_OK;
+	scan *scans = malloc((rows + 1) * sizeof *scans);
+	double *taken = malloc(2 * (rows + 1) * sizeof *taken);
+	int status = scans && taken ? TACTUS_OK : TACTUS_ERR_MEMORY;
+	size_t count = status == TACTUS_OK ? list_scans(sequence, rows, scans) : 0;
+	for (size_t k = 1; k < count; k++)
+		taken[k - 1] = scans[k].sequence - scans[k - 1].sequence;
+	if (count > 1)
+		status = say_lost(recording, scans, count, median_of(taken, count - 1, taken + count), problems);
+	free(scans);
+	free(taken);
+	return status;
+}
+
+/* ---- all of them ---- */
+
 int tactus_gate_clocks(const tactus_table *recording, const tactus_series *series, size_t count,
 					   tactus_gate_problems *problems)
 {
@@ -259,6 +318,8 @@ int tactus_gate_clocks(const tactus_table *recording, const tactus_series *serie
 	}
 	for (int kind = 0; kind < KINDS && status == TACTUS_OK; kind++)
 		status = say_kind(t, kind, recording, series, count, problems);
+	if (status == TACTUS_OK)
+		status = judge_lost(recording, problems);
 	free(t);
 	return status;
 }

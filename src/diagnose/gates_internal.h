@@ -39,7 +39,9 @@ typedef struct {
 void tactus_gate_note(tactus_gate_found *found, const tactus_series *series, size_t sample);
 /* How many rows are listed. */
 size_t tactus_gate_listed(const tactus_gate_found *found);
-/* "line 134 (30.25 s)", "row 133" where the recording came from no file; written to text and returned. */
+/* "line 134 (30.25 s)", "row 133" where the recording came from no file; NaN: no time. Written to text and returned. */
+const char *tactus_gate_row(const tactus_table *recording, size_t row, double time_s, char text[TACTUS_GATE_TEXT]);
+/* The same of a sample of a series. */
 const char *tactus_gate_place(const tactus_table *recording, const tactus_series *series, size_t sample,
 							  char text[TACTUS_GATE_TEXT]);
 /* "channel 3: " where there are several channels, else ""; written to text and returned. */

@@ -482,6 +482,20 @@ made() {
 	tactus diagnose c.csv --json | jq -e '[.series[0].not_testable[].effect] | index("creep") != null'
 }
 
+@test "scans that only the other mode has rows of are not lost; one that no row has is" {
+	awk 'BEGIN { srand(5); pi = atan2(0, -1)
+		print "time_s,sequence,channel,mode,drive_V,frequency_Hz,reference_resistance_ohm,reference_capacitance_F,amplitude_V,phase_rad"
+		for (i = 0; i < 100; i++) for (c = 1; c <= 4; c++) {
+			dc = i % 25 < 5; f = dc ? 0 : 500 * 2 ^ (i % 4); r = 1000 * c * (1 + i % 3); w = 2 * pi * f * r * 1e-10
+			a = 1000 / r * sqrt(1 + w * w) + 1e-5 * (rand() - 0.5); phase = atan2(w, 1) + 1e-5 * (rand() - 0.5)
+			printf "%.10g,%d,%d,%s,1,%g,%g,1e-10,%.9g,%s\n", i / 10, i, c, dc ? "dc" : "ac", f, r, a, dc || i % 7 == 3 ? "" : sprintf("%.9g", phase) } }' >blocks.csv
+	tactus show blocks.csv | grep -q ', 0 lost'
+	tactus diagnose blocks.csv --json | jq -e 'all(.problems[]; .kind != "lost-scans")'
+	grep -v '^[0-9.]*,61,' blocks.csv >lost.csv
+	tactus diagnose lost.csv --json | jq -e '[.problems[] | select(.kind == "lost-scans") | .text | startswith("sequence skips 1 scan (1 %) in 1 place, first before ")] == [true]'
+	tactus show lost.csv | grep -q ', 1 lost'
+}
+
 @test "wild readings are excluded, and said" {
 	made 'if (i == 77 || i == 300) g = 1' >wild.csv
 	survives wild.csv

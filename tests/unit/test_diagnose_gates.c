@@ -169,7 +169,7 @@ static void lost_scans_are_counted_and_are_no_gap_of_the_clock(void **unused)
 		values(table, "sequence")[i] += 30;
 		values(table, "time_s")[i] += 3;
 	}
-	expect(table, "lost-scans", 0, false, SAMPLES, "skips 30 scans (4.8 %) in 1 places, first before row 400");
+	expect(table, "lost-scans", 0, false, SAMPLES, "skips 30 scans (4.8 %) in 1 place, first before row 400");
 }
 
 /* ---- values ---- */
