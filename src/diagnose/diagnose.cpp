@@ -233,12 +233,12 @@ void Diagnosis::explain(Work &work)
 			problem.noise.spread[o] = d.swing.floor[o];
 }
 
-/* The gravest verdict of the series is that of the whole. */
+/* The gravest verdict of the series is that of the whole; nothing is wrong only where every series could be judged. */
 void Diagnosis::summarise()
 {
 	static const enum tactus_verdict order[] = {TACTUS_VERDICT_CAUSE_FOUND,   TACTUS_VERDICT_STALE_CALIBRATION,
 												TACTUS_VERDICT_AMBIGUOUS,     TACTUS_VERDICT_UNEXPLAINED,
-												TACTUS_VERDICT_NOTHING_WRONG, TACTUS_VERDICT_BAD_RECORDING};
+												TACTUS_VERDICT_BAD_RECORDING, TACTUS_VERDICT_NOTHING_WRONG};
 	tactus_diagnosis &d = store->diagnosis;
 	d.verdict = TACTUS_VERDICT_BAD_RECORDING;
 	for (const enum tactus_verdict v : order)

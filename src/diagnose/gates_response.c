@@ -353,13 +353,14 @@ static int judge_pair(const tactus_gate_view *a, const tactus_gate_view *b, doub
 	if (n < PAIRS_MIN || !on_a_line(pairs[0], pairs[1], n, &slope) || on_a_line(pairs[2], pairs[0], n, &by_load))
 		return TACTUS_OK; /* without noise two linear sensors under one load are alike, and no fault */
 	equal = a->scale == b->scale ? identical(pairs[0], pairs[1], n) : 0;
+	/* Fatal, so that nothing of the copy passes for a channel that was looked at. */
 	if ((double)equal >= ALIKE * (double)n)
-		return tactus_gate_add(problems, "duplicate-channel", b->series->channel, false, NULL, 0,
+		return tactus_gate_add(problems, "duplicate-channel", b->series->channel, true, NULL, 0,
 							   "%s is the same as that of channel %d in %zu of %zu scans: one of the two is not "
 							   "connected to its own sensor",
 							   b->name, a->series->channel, equal, n);
 	return tactus_gate_add(
-		problems, "duplicate-channel", b->series->channel, false, NULL, 0,
+		problems, "duplicate-channel", b->series->channel, true, NULL, 0,
 		"%s is exactly %.4g times that of channel %d, noise included, in %zu scans: one of the two is "
 		"not connected to its own sensor",
 		b->name, slope * b->scale / a->scale, a->series->channel, n);

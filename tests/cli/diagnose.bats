@@ -439,6 +439,27 @@ made() {
 	for f in a b c d; do survives $f.csv; done
 }
 
+@test "several channels of which one is dead or a copy of another: a bad recording, which no script passes" {
+	pair() { # AWK: the second channel's reading g, from its load f; the first one's is h
+		awk "BEGIN { srand(3); print \"time_s,sequence,channel,force_N,conductance_S\"
+			for (i = 0; i < 600; i++) for (c = 1; c <= 2; c++) {
+				f = i % 200 < 100 ? i % 200 : 200 - i % 200; g = 1e-6 + 4e-7 * f + 2e-8 * (rand() + rand() + rand() - 1.5)
+				if (c == 1) h = g; else { $1 }
+				printf \"%.10g,%d,%d,%g,%.9g\n\", i / 10, i, c, f, g } }"
+	}
+	pair "" >good.csv
+	pair "g = 3e-6" >dead.csv
+	pair "g = h" >copy.csv
+	run tactus diagnose good.csv --exit-verdict --json
+	status_is 11
+	for kind in dead copy; do
+		run --separate-stderr tactus diagnose $kind.csv --exit-verdict --json
+		status_is 15
+		jq -e '.verdict == "bad-recording" and [.series[].verdict] == ["nothing-wrong", "bad-recording"] and
+			any(.problems[]; .kind == "dead-channel" or .kind == "duplicate-channel")' <<<"$output"
+	done
+}
+
 @test "missing values in the middle; nothing but missing values" {
 	made 'if (i > 200 && i < 260) g = ""; if (i % 37 == 0) f = ""' >gaps.csv
 	survives gaps.csv

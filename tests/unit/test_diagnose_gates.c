@@ -341,7 +341,7 @@ static void two_channels_that_read_the_same_are_said(void **unused)
 {
 	(void)unused;
 	expect_none(two_channels(false));
-	expect(two_channels(true), "duplicate-channel", 2, false, 300, "exactly 1.5 times that of channel 1");
+	expect(two_channels(true), "duplicate-channel", 2, true, 300, "exactly 1.5 times that of channel 1");
 }
 
 static void a_fault_of_one_channel_names_it(void **unused)
