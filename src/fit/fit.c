@@ -113,7 +113,18 @@ static int plan_of_start(tactus_plan *plan, const tactus_domain *domain, const t
 	return status;
 }
 
-static int make_plan(const tactus_fit_options *options, const tactus_series *series, const kind *k, tactus_plan *plan)
+/* A column without one value, as a scan in dc writes for the capacitance, is no output; if asked for by name it is. */
+static bool has_output(const tactus_fit_options *options, const tactus_series *series, size_t count, size_t o)
+{
+	const char *name = series->output_name[o];
+	bool there = name && name[0], values = options->output && there && strcmp(options->output, name) == 0;
+	for (size_t c = 0; c < count && !values; c++)
+		values = series[c].recorded[tactus_output_signal(series->domain, o)];
+	return there && values;
+}
+
+static int make_plan(const tactus_fit_options *options, const tactus_series *series, size_t count, const kind *k,
+					 tactus_plan *plan)
 {
 	const tactus_domain *domain = series->domain;
 	*plan = (tactus_plan){.form = k->form};
@@ -126,7 +137,7 @@ static int make_plan(const tactus_fit_options *options, const tactus_series *ser
 		status = add_effects(plan, domain, k->effects);
 	} else {
 		for (size_t o = 0; tactus_output_signal(domain, o) != SIZE_MAX; o++)
-			plan->outputs[o] = series->output_name[o] && series->output_name[o][0];
+			plan->outputs[o] = has_output(options, series, count, o);
 	}
 	if (status == TACTUS_OK && plan->form != TACTUS_FORM_FORWARD && options->effects)
 		status = tactus_fail(TACTUS_ERR_ARGUMENT, "the model '%s' takes no effects: it goes from readings to force",
@@ -388,7 +399,7 @@ int tactus_fit(const tactus_table *recording, const tactus_fit_options *options,
 		status = tactus_series_split(recording, &columns, &series, &count);
 	if (status != TACTUS_OK)
 		return status;
-	status = make_plan(o, &series[0], k, &plan);
+	status = make_plan(o, series, count, k, &plan);
 	if (status == TACTUS_OK) {
 		tactus_work work = {.recording = recording,
 							.series = series,

@@ -244,6 +244,18 @@ columns() { grep -v '^#' | head -1; }
 	status_is 1
 }
 
+@test "fit --model forward: a column that a scan in dc leaves empty is no output, unless it is asked for" {
+	tactus scan sim:lebosse --count 1000 -q -o dc.csv
+	tactus fit dc.csv --model forward -q -o forward.toml >forward
+	tactus fit dc.csv --model conductance -q >conductance
+	cmp forward conductance
+	grep -q '^.output.conductance_S.' forward.toml
+	if grep -q capacitance_F forward.toml; then fail "an output without readings"; fi
+	run --separate-stderr tactus fit dc.csv --model forward --output capacitance_F
+	status_is 3
+	says "column 'capacitance_F' has no number in it"
+}
+
 @test "fit --seed, --jobs: the same bits whatever the number of threads" {
 	tactus scan sim: --channels 1-2 -o run.csv
 	tactus fit run.csv --model network --starts 3 --seed 4 --jobs 1 -o a.toml -q >a
