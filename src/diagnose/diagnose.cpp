@@ -397,12 +397,12 @@ int Diagnosis::run()
 			const size_t shown = std::min<size_t>(rows.size(), 100);
 			store->problems.push_back(
 				{"outliers",
-				 store->format("%zu isolated wild reading%s of %s left out: more than eight times the noise off while "
-							   "the readings beside "
-							   "%s are not",
-							   rows.size(), rows.size() == 1 ? " is" : "s are",
-							   work.output_name[0].empty() ? work.output_name[1].c_str() : work.output_name[0].c_str(),
-							   rows.size() == 1 ? "it" : "them"),
+				 store->format(
+					 "%zu isolated wild reading%s of %s %s left out: more than eight times the noise off while "
+					 "the readings beside %s are not",
+					 rows.size(), rows.size() == 1 ? "" : "s",
+					 work.output_name[0].empty() ? work.output_name[1].c_str() : work.output_name[0].c_str(),
+					 rows.size() == 1 ? "is" : "are", rows.size() == 1 ? "it" : "them"),
 				 0, work.said_channel(), false,
 				 store->keep(std::vector<size_t>(rows.begin(), rows.begin() + long(shown))), shown});
 		}
