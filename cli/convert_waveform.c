@@ -380,6 +380,8 @@ static int run_binary(struct waveform *w, struct binary *b, int file)
 			status = flush(w);
 	}
 	unsigned long long length = b->position + kept;
+	if (!status && length == 0 && !cli_signal)
+		status = cli_error(w->cli, CLI_INPUT, "%s: the file is empty; samples were expected", w->name);
 	if (!status && kept > 0 && !cli_signal)
 		status = cli_error(w->cli, CLI_INPUT, "%s: ends within a sample, after byte %llu", w->name, length);
 	return status;

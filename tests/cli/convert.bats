@@ -233,6 +233,12 @@ check_scan() { # FILE TOLERANCE
 	status_is 3
 	says "within a sample"
 	[ ! -e out.csv ]
+	for format in int16 float32; do
+		run --separate-stderr bash -c ": | tactus convert - -w $format --sample-scale 1V --sample-rate 200kHz --frequency 4kHz --drive 3V -g 1kohm"
+		status_is 3
+		says "the file is empty"
+		[ -z "$output" ] || fail "a header without samples"
+	done
 	printf '\0\0\300\177' >nan.f32
 	run --separate-stderr tactus convert nan.f32 -w float32 --sample-rate 200kHz --frequency 4kHz --drive 3V -g 1kohm
 	status_is 3
