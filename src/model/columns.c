@@ -142,11 +142,30 @@ static bool fits(const tactus_table *table, const tactus_domain *domain, const t
 	return what_misses(&columns, options->inputs_only, has_value) == NULL;
 }
 
-/* Why no domain fits: by the one whose first input is there, else by the first domain. */
+/* True if a column that was asked for by name is there with numbers; else the message says what it is instead. */
+static bool there(const tactus_columns *columns, const char *name, const char *role)
+{
+	const double *values = name ? tactus_table_numbers(columns->table, name) : NULL;
+	size_t rows = tactus_table_rows(columns->table), r = 0;
+	while (values && r < rows && isnan(values[r]))
+		r++;
+	if (!name || (values && r < rows))
+		return true;
+	if (tactus_table_find(columns->table, name) >= 0)
+		tactus_columns_fail_missing(columns, name);
+	else
+		tactus_fail(TACTUS_ERR_INPUT, "%sno column '%s', which was to be the %s", tactus_columns_where(columns), name,
+					role);
+	return false;
+}
+
+/* Why no domain fits: a column that was named and is not there; by the one whose first input is there; else all. */
 static void fail_domain(const tactus_table *table, const tactus_series_options *options)
 {
 	tactus_columns columns = {.table = table};
 	const tactus_domain *domain;
+	if (!there(&columns, options->input, "input") || !there(&columns, options->output, "output"))
+		return;
 	for (size_t i = 0; (domain = tactus_domain_at(i)) != NULL; i++) {
 		tactus_columns_of_domain(domain, &columns);
 		rename_signals(options, &columns);

@@ -403,9 +403,14 @@ survives() {
 	status_is 3
 	run --separate-stderr tactus diagnose "$creep" --domain wrench
 	status_is 2
-	run --separate-stderr tactus diagnose "$creep" --output nosuch_S
-	status_is 3
-	says nosuch_S
+	for role in input output; do
+		run --separate-stderr tactus diagnose "$creep" --$role nosuch_S
+		status_is 3
+		says "no column 'nosuch_S', which was to be the $role"
+		run --separate-stderr tactus diagnose "$creep" --$role mode
+		status_is 3
+		says "column 'mode' has no number in it"
+	done
 }
 
 # ---- bad input ------------------------------------------------------------------------------------------------------
