@@ -26,9 +26,10 @@ struct column {
 struct channel {
 	double number;
 	size_t rows;
+	double last_s;
 };
 
-/* Instants at which a scan begins (with `sequence`), or all (without). */
+/* Instants at which a scan begins (with `sequence`), or all (without): channels side by side share one. */
 struct clock {
 	double *time_s;
 	size_t n, capacity;
@@ -106,7 +107,7 @@ static int add_channels(struct recording *recording, const double *channel, size
 			if (!more)
 				return TACTUS_ERR_MEMORY;
 			recording->channels = more;
-			more[recording->channel_count++] = (struct channel){.number = channel[i]};
+			more[recording->channel_count++] = (struct channel){.number = channel[i], .last_s = NAN};
 		}
 		recording->channels[c].rows++;
 	}
@@ -145,14 +146,33 @@ static bool new_scan(struct clock *clock, double sequence)
 	return begins;
 }
 
-static int add_clock(struct clock *clock, const double *time_s, const double *sequence, size_t n)
+/* True if a row has the instant of the one before it, and its channel has not been read at that instant yet. */
+static bool beside(struct recording *recording, double channel, double time_s)
 {
+	for (size_t c = 0; c < recording->channel_count; c++) {
+		struct channel *own = &recording->channels[c];
+		if (own->number != channel)
+			continue;
+		bool again = own->last_s == time_s;
+		own->last_s = time_s;
+		return !again && time_s == recording->clock.last_s;
+	}
+	return false;
+}
+
+static int add_clock(struct recording *recording, const tactus_table *block, size_t n)
+{
+	struct clock *clock = &recording->clock;
+	const double *time_s = tactus_table_numbers(block, "time_s"), *sequence = tactus_table_numbers(block, "sequence");
+	const double *channel = tactus_table_numbers(block, "channel");
 	clock->has_time = clock->has_time || time_s;
 	clock->has_sequence = clock->has_sequence || sequence;
 	for (size_t i = 0; i < n; i++) {
 		bool begins = sequence ? new_scan(clock, sequence[i]) : true;
 		if (!time_s || isnan(time_s[i]))
 			continue;
+		if (!sequence && channel)
+			begins = !beside(recording, channel[i], time_s[i]);
 		clock->backward += time_s[i] < clock->last_s;
 		clock->repeated += begins && time_s[i] == clock->last_s;
 		clock->last_s = time_s[i];
@@ -179,9 +199,7 @@ static int add_block(struct recording *recording, const tactus_table *block)
 		recording->domain = tactus_domain_of(block);
 	const double *channel = tactus_table_numbers(block, "channel");
 	int error = channel ? add_channels(recording, channel, n) : 0;
-	return error ? error
-				 : add_clock(&recording->clock, tactus_table_numbers(block, "time_s"),
-							 tactus_table_numbers(block, "sequence"), n);
+	return error ? error : add_clock(recording, block, n);
 }
 
 static int by_number(const void *a, const void *b)

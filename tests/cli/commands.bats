@@ -173,6 +173,15 @@ plain_model() {
 
 # ---- show ----------------------------------------------------------------------------------------------------------
 
+@test "show a recording of channels side by side: readings of one instant are no repeats of the clock" {
+	map='time_s=ms/1000,force_N=load_g*0.00980665,conductance_S@1=A0/1.023e7,conductance_S@2=A1/1.023e7'
+	tactus show "$examples/arduino-log.csv" --decimal-comma --columns "$map" >shown
+	grep -q '^clock: 1.001 s to 18.902 s, usually 0.1 s apart (10 Hz); 0 gaps, longest 0.102 s$' shown || fail "$(cat shown)"
+	if grep 'same instant' shown; then fail "repeats"; fi
+	printf '%s\n' time_s,channel,force_N,conductance_S 0,1,1,1 0,2,1,1 1,1,1,1 1,2,1,1 1,2,1,1 2,1,1,1 2,2,1,1 >twice.csv
+	tactus show twice.csv --json | jq -e '.clock.repeated == 1 and .clock.backward == 0'
+}
+
 @test "show a recording: rows, channels, ranges, missing values, clock, lost scans, metadata" {
 	recording >all.csv
 	# Scans 5, 6 and 20 are lost; a value of scan 30 is missing; metadata come first.
