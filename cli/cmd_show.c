@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "show.h"
 
@@ -12,7 +13,7 @@ static bool looks_like_toml(const char *file)
 	bool toml = strncmp(file, "sim:", 4) == 0, begins = true;
 	FILE *stream = strcmp(file, "-") != 0 && !toml ? fopen(file, "r") : NULL;
 	if (!stream && !toml)
-		return tactus_bench_is(file) || tactus_profile_is(file); /* built in */
+		return tactus_bench_is(file) || tactus_profile_is(file) || tactus_loads_is(file); /* built in */
 	while (stream && fgets(line, sizeof line, stream)) {
 		bool whole = strchr(line, '\n') != NULL, blank = line[strspn(line, " \t\r\n")] == '\0';
 		if (begins && line[0] != '#' && !blank) {
@@ -30,7 +31,8 @@ static bool looks_like_toml(const char *file)
 static int run(struct cli *cli)
 {
 	const char *name = cli_argument(cli, 0);
-	if (cli_has(cli, "effects"))
+	if (cli_has(cli, "effects") ||
+		(name && cli_show_effect_is(name) && access(name, F_OK) != 0)) /* a file goes first */
 		return cli_show_effects(cli, name);
 	const char *file = cli_recording(cli, 0);
 	if (!file)
@@ -47,7 +49,7 @@ static const struct cli_option options[] = {
 
 const struct cli_command cli_show = {
 	.name = "show",
-	.summary = "say what a recording, a model, a bench or a device's profile is; list effects",
+	.summary = "say what a recording, a model, a bench, a device's profile or a file of loads is; list effects",
 	.arguments = "[FILE | EFFECT]",
 	.description =
 		"Of a recording: its domain, rows, channels, every column with its range and how many values are missing, the "
@@ -55,14 +57,16 @@ const struct cli_command cli_show = {
 		"Of a model: its form, what it computes from what, the parameters of every channel with their standard "
 		"errors, the range that it is valid in, its errors, and where it came from. Of a bench: what the bench is "
 		"made of, and how it hangs on a device. Of a profile of a device: whose driver reads it, what is written, and "
-		"which register or field every column comes from. Built-in benches and profiles are shown by their names.\n\n"
+		"which register or field every column comes from. Of calibration loads (scan --loads): how many, and their "
+		"ranges. What is built in "
+		"is shown by its name.\n\n"
 		"With --effects, the catalogue of physical causes that a model may have beside the base equations: what each "
 		"does, where it is published, its parameters, what a recording must contain for it to be found, and what it is "
-		"confused with.",
+		"confused with. The name of an effect alone will do where no file has it.",
 	.examples = "tactus show run.csv\n"
 				"tactus show model.toml --json\n"
 				"tactus show tactus-board   # a built-in profile\n"
-				"tactus show --effects creep\n",
+				"tactus show creep   # one effect of `tactus show --effects`\n",
 	.options = options,
 	.arguments_max = 1,
 	.run = run,

@@ -5,8 +5,10 @@
 #include "cli.h"
 
 int cli_show_recording(const struct cli *cli, const char *file);
-/* A model, a bench or a profile of a device. */
+/* A model, a bench, a profile of a device or calibration loads. */
 int cli_show_model(const struct cli *cli, const char *file);
+/* True if an effect has that name. */
+bool cli_show_effect_is(const char *name);
 /* The catalogue, or one effect of it. */
 int cli_show_effects(const struct cli *cli, const char *name);
 

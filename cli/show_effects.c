@@ -115,9 +115,14 @@ static void visit_nothing(void *context, const tactus_effect *effect, const tact
 	(void)context, (void)effect, (void)domain;
 }
 
+bool cli_show_effect_is(const char *name)
+{
+	return each_effect(name, visit_nothing, NULL) > 0;
+}
+
 int cli_show_effects(const struct cli *cli, const char *name)
 {
-	if (name && !each_effect(name, visit_nothing, NULL))
+	if (name && !cli_show_effect_is(name))
 		return cli_error(cli, CLI_USAGE, "'%s' is no effect; `tactus show --effects` lists them", name);
 	if (cli_has(cli, "json")) {
 		struct cli_json *json = cli_json_begin();

@@ -267,8 +267,31 @@ static int show_profile(const struct cli *cli, const char *file)
 	return status;
 }
 
+static int show_loads(const struct cli *cli, const char *file)
+{
+	tactus_metadata *facts;
+	const int error = tactus_loads_describe(file, &facts);
+	if (error)
+		return cli_fail(cli, error);
+	int status = CLI_OK;
+	if (cli_has(cli, "json")) {
+		struct cli_json *json = cli_json_begin();
+		cli_json_string(json, "kind", "loads");
+		cli_json_string(json, "file", file);
+		json_metadata(json, "loads", facts);
+		status = cli_json_end(json);
+	} else {
+		printf("%s: calibration loads for `tactus scan --loads`\n", file);
+		print_metadata(facts);
+	}
+	tactus_metadata_free(facts);
+	return status;
+}
+
 int cli_show_model(const struct cli *cli, const char *file)
 {
+	if (tactus_loads_is(file))
+		return show_loads(cli, file);
 	if (tactus_bench_is(file))
 		return show_bench(cli, file);
 	if (tactus_profile_is(file))

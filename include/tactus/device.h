@@ -159,6 +159,17 @@ TACTUS_API bool tactus_profile_is(const char *path);
  */
 TACTUS_API int tactus_profile_describe(const char *profile, tactus_metadata **facts, tactus_metadata **columns);
 
+/* ---- calibration loads ---- */
+
+/** True for "standard", and for a TOML file of kind "loads". */
+TACTUS_API bool tactus_loads_is(const char *path);
+/**
+ * What a file of loads holds, as `key: value`: how many, the ranges of resistance and capacitance in ohm and F, the
+ * frequencies and drives that each meets, passes. Free with tactus_metadata_free(); NULL after an error,
+ * TACTUS_ERR_INPUT with FILE:LINE:COLUMN.
+ */
+TACTUS_API int tactus_loads_describe(const char *loads, tactus_metadata **facts);
+
 /**
  * Readings of a scan as a table in the contract's columns: raw (detector volts) or as amplitude and phase, ready for
  * tactus_converter_new(). Creates the columns on the first call and sets the rows.

@@ -24,6 +24,18 @@ int tactus_builtin_toml(const char *path, tactus_toml **document)
 	return text != NULL ? tactus_toml_parse(path, text, document) : tactus_toml_read(path, document);
 }
 
+bool tactus_builtin_kind(const char *path, const char *kind)
+{
+	tactus_toml *document = NULL;
+	const char *says = "";
+	if (strcmp(path, "-") == 0 || tactus_builtin_toml(path, &document) < 0)
+		return false;
+	tactus_toml_string(tactus_toml_root(document), "kind", &says);
+	const bool is = strcmp(says, kind) == 0;
+	tactus_toml_free(document);
+	return is;
+}
+
 int tactus_bench_format(const tactus_toml_node *root)
 {
 	double format = 1;

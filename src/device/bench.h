@@ -103,6 +103,8 @@ extern const tactus_builtin tactus_builtins[]; /* ends with a NULL name; benches
 const char *tactus_builtin_find(const char *name);
 /* A file, or the built-in one of that name where there is no such file. Negative if neither can be read. */
 int tactus_builtin_toml(const char *path, tactus_toml **document);
+/* True if such a file can be read and says that it is of that kind; not of standard input, which is read once. */
+bool tactus_builtin_kind(const char *path, const char *kind);
 /* TACTUS_ERR_INPUT with FILE:LINE:COLUMN for a bench or profile of a later format. */
 int tactus_bench_format(const tactus_toml_node *root);
 

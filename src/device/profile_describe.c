@@ -15,14 +15,7 @@ enum { TEXT = 2048 };
 
 bool tactus_profile_is(const char *path)
 {
-	tactus_toml *document = NULL;
-	const char *kind = "";
-	if (strcmp(path, "-") == 0 || tactus_builtin_toml(path, &document) < 0)
-		return false;
-	tactus_toml_string(tactus_toml_root(document), "kind", &kind);
-	const bool is = strcmp(kind, "profile") == 0;
-	tactus_toml_free(document);
-	return is;
+	return tactus_builtin_kind(path, "profile");
 }
 
 /* ---- registers ---- */

@@ -263,6 +263,20 @@ plain_model() {
 	status_is 3
 }
 
+@test "show calibration loads: how many, their ranges, frequencies and drives; built in, and a file" {
+	run --separate-stderr tactus show "$examples/loads-decades.toml"
+	status_is 0
+	prints "calibration loads"
+	tactus show "$examples/loads-decades.toml" --json | jq -e '.kind == "loads" and .loads == {"loads": "5",
+		"resistance_ohm": "3300 to 330000, 1 open", "capacitance_F": "1e-10 to 4.7e-10, 1 without",
+		"frequencies_Hz": "1000, 4000", "passes": "1"}'
+	tactus show standard | grep -q '^  loads  *[0-9]'
+	printf 'kind = "loads"\n[[load]]\nresistance_ohm = -1\n' >bad.toml
+	run --separate-stderr tactus show bad.toml
+	status_is 3
+	says bad.toml:2
+}
+
 @test "show --effects: all 29 effects by name, one in full, an unknown one refused" {
 	tactus show --effects --json >effects.json
 	[ "$(jq '[.effects[] | select(.domain == "sensor")] | length' effects.json)" -eq 16 ]
@@ -274,6 +288,9 @@ plain_model() {
 	run --separate-stderr tactus show --effects creep
 	status_is 0
 	prints "confused with  drift"
+	[ "$(tactus show creep)" = "$output" ] || fail "the name alone does not do"
+	cp "$examples/model-forward.toml" creep
+	tactus show creep | grep -q 'forward model' || fail "an effect before a file"
 	run --separate-stderr tactus show --effects crepe
 	status_is 2
 	says "'crepe' is no effect"
