@@ -411,6 +411,8 @@ static int check_usage(const struct cli *cli)
 	for (size_t i = 0; i < sizeof above_zero / sizeof *above_zero; i++)
 		if (cli_quantity(cli, above_zero[i], NAN) == 0)
 			return cli_error(cli, CLI_USAGE, "--%s: must not be zero", above_zero[i]);
+	if (cli_integer(cli, "count", 1) == 0)
+		return cli_error(cli, CLI_USAGE, "--count: must not be zero");
 	if (cli_has(cli, "tare") && !model)
 		return cli_error(cli, CLI_USAGE, "--tare needs a model (-m MODEL): it is the force that is tared");
 	if (cli_has(cli, "raw") && model)

@@ -214,6 +214,18 @@ static bool informed(const struct cli *cli)
 	return true;
 }
 
+/* What no command can do both of, wherever it has the options. */
+static int check_contradictions(const struct cli *cli)
+{
+	if (cli_has(cli, "quiet") && cli_has(cli, "verbose"))
+		cli_error(cli, CLI_USAGE, "--quiet and --verbose contradict each other");
+	else if (cli_has(cli, "json") && !strcmp(cli_string(cli, "format", ""), "csv"))
+		cli_error(cli, CLI_USAGE, "--json and --format csv contradict each other");
+	else
+		return 0;
+	return try_help(cli);
+}
+
 int cli_parse(struct cli *cli, const struct cli_command *command, int argc, char **argv)
 {
 	size_t n = count_options(command);
@@ -225,7 +237,7 @@ int cli_parse(struct cli *cli, const struct cli_command *command, int argc, char
 	} else if ((status = read_options(cli, argc, argv, &spelling)) == 0) {
 		cli->arguments = argv + optind;
 		cli->argument_count = (size_t)(argc - optind);
-		status = informed(cli) ? CLI_OK : check_arguments(cli) ? CLI_USAGE : -1;
+		status = informed(cli) ? CLI_OK : check_arguments(cli) || check_contradictions(cli) ? CLI_USAGE : -1;
 	}
 	free(spelling.longs);
 	free(spelling.shorts);
@@ -293,7 +305,7 @@ bool cli_quiet(const struct cli *cli)
 
 bool cli_verbose(const struct cli *cli)
 {
-	return cli_has(cli, "verbose") && !cli_quiet(cli);
+	return cli_has(cli, "verbose");
 }
 
 /* "A" or "A-B" at *text as channels first … last (either way round); false if it is neither. */

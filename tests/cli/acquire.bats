@@ -73,7 +73,7 @@ columns() { grep -v '^#' | head -1; }
 }
 
 @test "scan: what the settings cannot be is status 2, before anything is written" {
-	for args in "--rate 0" "--drive 0V" "--frequency 0" "--rate -1Hz" "--rate 1MHz" "--channels 9" "--channels 0" "--channels 1,1x" "--mode both" \
+	for args in "--rate 0" "--count 0" "--drive 0V" "--frequency 0" "--rate -1Hz" "--rate 1MHz" "--channels 9" "--channels 0" "--channels 1,1x" "--mode both" \
 		"--duration -1s" "--settle -1ms" "--frequency -4kHz" "--tare" "--protocol nonsense" "--max-lost 200" "--timeout -1s" "--timeout 0" "--reconnect-timeout -3s" "--raw -m $examples/model-forward.toml"; do
 		run --separate-stderr tactus scan sim: $args -o out.csv
 		status_is 2

@@ -92,6 +92,18 @@ load common
 	says "an argument is missing: URI"
 }
 
+@test "options that contradict each other" {
+	run --separate-stderr tactus scan sim: -q -v --count 1
+	status_is 2
+	says "--quiet and --verbose contradict each other"
+	run --separate-stderr tactus scan sim: --count 1 --json --format csv
+	status_is 2
+	says "--json and --format csv contradict each other"
+	[ -z "$output" ]
+	tactus scan sim: --count 1 --json --format jsonl | tail -1 | jq -e .sequence
+	tactus scan sim: -q -v --help >/dev/null
+}
+
 @test "quantities: units are understood, anything else is refused with the text and the option" {
 	for bad in "10 bananas" "10HzX" "Hz" "" "1e999" "nan" "0x10" "1,5" "10 s"; do
 		run --separate-stderr tactus scan sim: --rate "$bad"
