@@ -294,7 +294,8 @@ static void experiment(const struct html *html, const tactus_diagnosed *series)
 		return;
 	html_element(html, "h3", "The next experiment");
 	html_element(html, "p", e->text);
-	html_element(html, "pre", e->command);
+	if (e->command)
+		html_element(html, "pre", e->command);
 }
 
 void html_series(const struct html *html, size_t index)
