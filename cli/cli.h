@@ -108,6 +108,9 @@ bool cli_verbose(const struct cli *cli);
  */
 int cli_channels(const struct cli *cli, const char *option, int **channels, size_t *count);
 
+/* The model that -m FILE named is no forward model: CLI_USAGE, with the message printed; else 0. */
+int cli_refuse_estimator(const struct cli *cli, const char *file, const tactus_model *model);
+
 /* Reading options of CLI_OPTIONS_READ and CLI_OPTIONS_READ_SCAN. */
 tactus_read_options cli_read_options(const struct cli *cli);
 tactus_read_options cli_read_options_scan(const struct cli *cli);

@@ -166,12 +166,7 @@ static int read_model(const struct cli *cli, tactus_model **model)
 	int error = !file ? 0 : tactus_bench_is(file) ? tactus_bench_model(file, model) : tactus_model_read(file, model);
 	if (error)
 		return cli_fail(cli, error);
-	if (*model && tactus_model_form(*model) != TACTUS_FORM_FORWARD)
-		return cli_error(cli, CLI_USAGE,
-						 "%s: is an estimator (%s), which predicts no readings; a forward model is needed, such as "
-						 "`tactus fit --model forward` writes",
-						 file, tactus_form_name(tactus_model_form(*model)));
-	return CLI_OK;
+	return *model ? cli_refuse_estimator(cli, file, *model) : CLI_OK;
 }
 
 static int over_recordings(const struct cli *cli, const char *const *paths, size_t count, const tactus_model *model)

@@ -396,10 +396,12 @@ static int run(struct cli *cli)
 	tactus_model *start = NULL;
 	tactus_table *recording = NULL;
 	int error = file ? tactus_model_read(file, &start) : 0;
+	int status = error ? cli_fail(cli, error) : start ? cli_refuse_estimator(cli, file, start) : CLI_OK;
 	tactus_read_options read = cli_read_options(cli);
-	if (!error)
-		error = tactus_table_read(path, &read, &recording);
-	int status = error ? cli_fail(cli, error) : fit_recording(cli, recording, start);
+	if (!status && (error = tactus_table_read(path, &read, &recording)) != 0)
+		status = cli_fail(cli, error);
+	if (!status)
+		status = fit_recording(cli, recording, start);
 	tactus_table_free(recording);
 	tactus_model_free(start);
 	return status;

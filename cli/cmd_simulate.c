@@ -219,7 +219,9 @@ static int run(struct cli *cli)
 	if (error)
 		return cli_fail(cli, error);
 	uint64_t noise = cli_has(cli, "noise") ? seed : 0;
-	int status = cli_has(cli, "protocol") ? over_protocol(cli, model, noise) : over_recording(cli, model, noise);
+	int status = cli_refuse_estimator(cli, file, model);
+	if (!status)
+		status = cli_has(cli, "protocol") ? over_protocol(cli, model, noise) : over_recording(cli, model, noise);
 	tactus_model_free(model);
 	return status;
 }

@@ -352,6 +352,16 @@ int cli_channels(const struct cli *cli, const char *option, int **channels, size
 	return 0;
 }
 
+int cli_refuse_estimator(const struct cli *cli, const char *file, const tactus_model *model)
+{
+	if (tactus_model_form(model) == TACTUS_FORM_FORWARD)
+		return 0;
+	return cli_error(cli, CLI_USAGE,
+					 "%s: is an estimator (%s), which predicts no readings; a forward model is needed, such as "
+					 "`tactus fit --model forward` writes",
+					 file, tactus_form_name(tactus_model_form(model)));
+}
+
 static tactus_read_options format_options(const struct cli *cli, const char *const names[3])
 {
 	const char *delimiter = cli_string(cli, names[0], "");

@@ -156,11 +156,13 @@ plain_model() {
 	done
 }
 
-@test "simulate: an estimator cannot be simulated, status 1" {
+@test "an estimator is refused alike by all that need a forward model: status 2" {
 	recording >run.csv
-	run --separate-stderr tactus simulate -m "$examples/model-linear.toml" run.csv
-	status_is 1
-	says "linear"
+	for command in simulate diagnose fit; do
+		run --separate-stderr tactus $command -m "$examples/model-linear.toml" run.csv
+		status_is 2
+		[ "$stderr" = "tactus $command: $examples/model-linear.toml: is an estimator (linear), which predicts no readings; a forward model is needed, such as \`tactus fit --model forward\` writes" ] || fail "said otherwise"
+	done
 }
 
 @test "simulate: a bench's sensors under the loads of a recording, and again the same" {
