@@ -536,11 +536,19 @@ void Decider::strays()
 
 void Decider::adequacy()
 {
+	std::vector<Dependence> beside; /* what shows once the jumps have followed what wanders */
 	if (d.causes.size() == 1 && (d.wander = wandering(d.causes.front())) > 0) {
+		beside = map(d.final);
 		d.causes.clear();
 		d.final = d.base;
 	}
 	d.left = d.causes.empty() ? d.wrong : map(d.final);
+	for (const Dependence &dep : beside)
+		if (std::none_of(d.left.begin(), d.left.end(),
+						 [&](const Dependence &f) { return f.group->covariate == dep.group->covariate; }))
+			d.left.push_back(dep);
+	std::stable_sort(d.left.begin(), d.left.end(),
+					 [](const Dependence &a, const Dependence &b) { return a.explained > b.explained; });
 	d.bursts = find_bursts(problem, d.final, evidence.groups);
 	d.swing = find_swing(problem, d.final.hypothesis, evidence.groups);
 	/* Steps without end are something that changes from stretch to stretch and was not recorded. */

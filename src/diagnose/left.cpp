@@ -384,11 +384,13 @@ double find_bursts(const Problem &problem, const Fit &fit, const std::vector<Gro
 	const double n = double(squares.size()), kurtosis = n * fourth / (second * second);
 	for (const Together &t : together)
 		score = std::fmax(score, t.score());
-	if (!(kurtosis > limits.tails) || (kurtosis - 3) / std::sqrt(24 / n) < 12 || !(score > limits.burst_score))
+	if (!(kurtosis > limits.tails) || (kurtosis - 3) / std::sqrt(24 / n) < 12)
 		return 0;
 	std::sort(squares.rbegin(), squares.rend());
 	for (size_t i = 0; i < squares.size() / 50 + 1; i++)
 		largest += squares[i];
+	if (!(score > limits.burst_score) && !(largest > limits.burst_gross * second))
+		return 0;
 	return largest / second;
 }
 

@@ -33,9 +33,10 @@ struct Limits {
 	double stray = 1.4;                         /* times the noise: more is not noise, whatever it is */
 	double tails = 5;                           /* kurtosis of whitened readings above which they may come in bursts */
 	double burst_score = 3.3;                   /* standard errors that they must stand together more than by chance */
-	double burst_least = 0.01;                  /* of the mean square, below which all are as small */
-	long burst_after = 2, burst_before = 10;    /* rows after a large one, and before it, that are looked at */
-	size_t burst_rows = 100;                    /* that a recording must have */
+	double burst_gross = 0.6;                /* of the squares in a fiftieth of the readings: no noise has such tails */
+	double burst_least = 0.01;               /* of the mean square, below which all are as small */
+	long burst_after = 2, burst_before = 10; /* rows after a large one, and before it, that are looked at */
+	size_t burst_rows = 100;                 /* that a recording must have */
 	/* Swings in what is left, by its spectrum: */
 	double swing_power = 25, swing_edge = 4; /* times what noise can be there, and where a swing then ends */
 	double swing_share = 0.1;                /* of the squares that it must be */

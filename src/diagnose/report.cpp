@@ -321,7 +321,7 @@ const tactus_dependence *unexplained(Store &store, const Work &work, const std::
 	const tactus_dependence *list = describe(store, work, d.left, d.final);
 	for (size_t i = 0; i < d.left.size(); i++)
 		result.push_back(list[i]);
-	if (d.wander > 0)
+	if (d.wander > limits.share)
 		result.push_back(
 			{"time_s", d.wander, 0,
 			 store.format("jumps explain %.0f %% of it, but do not foretell stretches that were not fitted: something "
