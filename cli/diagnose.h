@@ -31,7 +31,11 @@ int cli_si_prefix(double value, const char *unit, char text[32]);
 const char *cli_si_error(double value, double standard_error, const char *unit, char text[96]);
 /* "63 %" of 0.63; 99.95 % and above only where it is 100 %. */
 const char *cli_percent(double share, char text[32]);
-/* How large the error is beside the noise floor: "275 %", "31 ×". */
+/* The share of what can be explained: "93 %"; "all", where the error is at its estimate of the noise, or below. */
+const char *cli_of_explainable(double share, char text[32]);
+/* The error in newtons once extended, of a series that has one before; in words where it is not known. */
+const char *cli_force_after(const tactus_diagnosed *series, int digits, char text[96]);
+/* How large the error is beside the noise floor: "1.1 ×", "31 ×". */
 const char *cli_of_noise(const tactus_base_error *base, char text[32]);
 /* "−6944": a whole number where that is large, with a true minus sign. */
 const char *cli_bic(double delta_bic, char text[32]);

@@ -54,7 +54,7 @@ static void cards(const struct html *html, const tactus_diagnosed *series)
 		snprintf(label, sizeof label, "off, in %s", cli_quantity_name(base->output, name));
 		card(html, cli_si(base->rmse, base->unit, 2, text), label);
 		cli_of_noise(base, text);
-		card(html, text, strchr(text, '%') ? "of the noise floor" : "the noise floor");
+		card(html, text, "the noise floor");
 	}
 	if (gain && isfinite(gain->force_rmse_after_N))
 		card(html, cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", 2, text),
@@ -62,7 +62,7 @@ static void cards(const struct html *html, const tactus_diagnosed *series)
 	if (gain) {
 		card(html, cli_percent(gain->reduction, text),
 			 gain->no_force_gain ? "less error of the reading, unseen" : "less error on unseen data");
-		card(html, cli_percent(gain->of_explainable, text), "of what can be explained");
+		card(html, cli_of_explainable(gain->of_explainable, text), "of what can be explained");
 	}
 	fputs("</ul>\n", html->out);
 }

@@ -124,15 +124,15 @@ static void say_measured(const struct page *page, const tactus_diagnosed *series
 	if (series->channel)
 		words_add(&words, ", channel %d", series->channel);
 	if (series->samples)
-		words_add(&words, ", %zu samples", series->samples);
+		words_add(&words, ", %zu readings", series->samples);
 	if (series->left_out)
 		words_add(&words, ", %zu left out", series->left_out);
 	words_add(&words, ")");
 	for (size_t i = 0; i < series->base_count; i++) {
 		const tactus_base_error *base = &series->base[i];
 		cli_of_noise(base, share);
-		words_add(&words, "; %s off by %s rms, %s%s the noise floor", cli_quantity_name(base->output, quantity),
-				  cli_si(base->rmse, base->unit, 2, rmse), share, strchr(share, '%') ? " of" : "");
+		words_add(&words, "; %s off by %s rms, %s the noise floor", cli_quantity_name(base->output, quantity),
+				  cli_si(base->rmse, base->unit, 2, rmse), share);
 		if (fabs(base->refit_rmse - base->rmse) > 0.02 * base->rmse)
 			words_add(&words, " (%s after a refit)", cli_si_like(base->refit_rmse, base->rmse, base->unit, 2, refit));
 	}
@@ -233,19 +233,19 @@ static void say_no_force_gain(const struct page *page)
 static void say_gain(const struct page *page, const tactus_diagnosed *series)
 {
 	const tactus_gain *gain = series->gain;
-	char before[64], after[64], less[32], low[32], high[32], share[32], quantity[64];
+	char before[64], after[96], less[32], low[32], high[32], share[32], quantity[64];
 	struct words words = {0};
 	if (!gain)
 		return;
 	if (isfinite(gain->force_rmse_before_N) && !cli_no_force_gain(series))
 		words_add(&words, "%s → %s; ", cli_si(gain->force_rmse_before_N, "N", 2, before),
-				  cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", 2, after));
+				  cli_force_after(series, 2, after));
 	words_add(&words, "%s %s → %s, %s less (95 %%: %s to %s)", cli_quantity_name(gain->output, quantity),
 			  cli_si(gain->rmse_before, gain->unit, 2, before),
 			  cli_si_like(gain->rmse_after, gain->rmse_before, gain->unit, 2, after),
 			  cli_percent(gain->reduction, less), cli_percent(gain->ci95[0], low), cli_percent(gain->ci95[1], high));
 	if (isfinite(gain->of_explainable))
-		words_add(&words, "; %s of what can be explained", cli_percent(gain->of_explainable, share));
+		words_add(&words, "; %s of what can be explained", cli_of_explainable(gain->of_explainable, share));
 	page_item(page, "Gain", "on %s%s%s that no choice has seen: %s.", gain->blocks ? "" : "the ",
 			  gain->blocks ? "held-out " : "", gain->held_out ? gain->held_out : "data", words.text);
 	say_no_force_gain(page);
@@ -405,6 +405,19 @@ static void print_table(const struct page *page)
 	}
 }
 
+/* Why the last column is empty although the one before has newtons. */
+static void say_unknown_newtons(const struct page *page)
+{
+	char text[96];
+	for (size_t i = 0; i < page->diagnosis->series_count; i++) {
+		const tactus_diagnosed *series = &page->diagnosis->series[i];
+		if (!series->gain || !isfinite(series->gain->force_rmse_before_N) || isfinite(series->gain->force_rmse_after_N))
+			continue;
+		page_item(page, "", "–: what is off now is %s.", cli_force_after(series, 2, text));
+		return;
+	}
+}
+
 static void page_several(const struct page *page)
 {
 	char name[128];
@@ -414,6 +427,7 @@ static void page_several(const struct page *page)
 	page_item(page, "Measured", "%s (%s, %zu channels). Channel by channel:", recordings_name(page->diagnosis, name),
 			  page->diagnosis->domain, page->diagnosis->series_count);
 	print_table(page);
+	say_unknown_newtons(page);
 	say_no_force_gain(page);
 	say_next(page);
 }

@@ -1,6 +1,7 @@
 /* Numbers and names of a diagnosis as people read them. */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "diagnose.h"
@@ -55,10 +56,19 @@ static void put_exponent(char *text, size_t size, const char *mantissa, int expo
 		n += (size_t)snprintf(text + n, size - n, "%s", high[*d - '0']);
 }
 
+/* As many digits as are shown: what is rounded up to a thousand, or from below one to one, counts as that. */
+static double rounded(double value, int digits)
+{
+	char text[48];
+	snprintf(text, sizeof text, "%.*e", digits - 1, value);
+	return strtod(text, NULL);
+}
+
 /* The value with so many places behind the point, a power of ten apart where it is far from one. */
 static void put_number(char *text, size_t size, double value, int digits)
 {
-	int power = value != 0 ? (int)floor(log10(fabs(value))) : 0, places = digits - 1 - power;
+	double shown = rounded(value, digits);
+	int power = shown != 0 ? (int)floor(log10(fabs(shown)) + 1e-12) : 0, places = digits - 1 - power;
 	char mantissa[32];
 	if (power >= -3 && power < 6) {
 		snprintf(text, size, "%s%.*f", value < 0 ? "−" : "", places > 0 ? places : 0, fabs(value));
@@ -93,7 +103,7 @@ const char *cli_si_like(double value, double like, const char *unit, int digits,
 
 const char *cli_si(double value, const char *unit, int digits, char text[64])
 {
-	return cli_si_like(value, value, unit, digits, text);
+	return cli_si_like(value, rounded(value, digits), unit, digits, text);
 }
 
 const char *cli_si_error(double value, double standard_error, const char *unit, char text[96])
@@ -137,11 +147,30 @@ const char *cli_percent(double share, char text[32])
 const char *cli_of_noise(const tactus_base_error *base, char text[32])
 {
 	double share = base->rmse / base->noise_floor;
-	if (!(base->noise_floor > 0))
+	if (!(base->noise_floor > 0) || !isfinite(share))
 		return none(text);
-	if (!(share >= 1.5) || share > 1e9)
-		return cli_percent(share, text);
-	snprintf(text, 32, share < 9.95 ? "%.1f ×" : "%.0f ×", share);
+	snprintf(text, 32, share < 9.95 ? "%.1f ×" : share < 1e6 ? "%.0f ×" : "%.1e ×", share);
+	return text;
+}
+
+const char *cli_of_explainable(double share, char text[32])
+{
+	char percent[32];
+	if (!isfinite(share))
+		return none(text);
+	snprintf(text, 32, "%s", share < 0.995 ? cli_percent(share, percent) : "all");
+	return text;
+}
+
+const char *cli_force_after(const tactus_diagnosed *series, int digits, char text[96])
+{
+	const tactus_gain *gain = series->gain;
+	bool coupled = false;
+	for (size_t i = 0; i < series->cause_count; i++)
+		coupled = coupled || strstr(series->causes[i].covariate, "of the neighbours");
+	if (isfinite(gain->force_rmse_after_N))
+		return cli_si_like(gain->force_rmse_after_N, gain->force_rmse_before_N, "N", digits, text);
+	snprintf(text, 96, "not known in newtons%s", coupled ? ", the channels being coupled and judged one by one" : "");
 	return text;
 }
 

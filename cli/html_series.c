@@ -227,7 +227,7 @@ static void not_testable_table(const struct html *html, const tactus_diagnosed *
 static void gain(const struct html *html, const tactus_diagnosed *series, size_t s)
 {
 	const tactus_gain *g = series->gain;
-	char text[64], name[64];
+	char text[96], name[64];
 	if (!g)
 		return;
 	html_element(html, "h3", "What the extended model gains");
@@ -242,7 +242,8 @@ static void gain(const struct html *html, const tactus_diagnosed *series, size_t
 	fputs(" to ", html->out);
 	html_inline(html, g->ci95[1], cli_percent(g->ci95[1], text), ".series[%zu].gain.ci95[1]", s);
 	fputs("); ", html->out);
-	html_inline(html, g->of_explainable, cli_percent(g->of_explainable, text), ".series[%zu].gain.of_explainable", s);
+	html_inline(html, g->of_explainable, cli_of_explainable(g->of_explainable, text),
+				".series[%zu].gain.of_explainable", s);
 	fputs(" of what can be explained.</p>\n", html->out);
 	html_table_begin(html, "gain", s, "held-out error|#before|#after");
 	fputs("<tr>", html->out);
@@ -254,8 +255,12 @@ static void gain(const struct html *html, const tactus_diagnosed *series, size_t
 	html_cell(html, "force, through the live inverse");
 	html_number(html, g->force_rmse_before_N, cli_si(g->force_rmse_before_N, "N", 3, text),
 				".series[%zu].gain.force_rmse_before_N", s);
-	html_number(html, g->force_rmse_after_N, cli_si_like(g->force_rmse_after_N, g->force_rmse_before_N, "N", 3, text),
-				".series[%zu].gain.force_rmse_after_N", s);
+	if (isfinite(g->force_rmse_before_N) && !isfinite(g->force_rmse_after_N))
+		html_cell(html, cli_force_after(series, 3, text));
+	else
+		html_number(html, g->force_rmse_after_N,
+					cli_si_like(g->force_rmse_after_N, g->force_rmse_before_N, "N", 3, text),
+					".series[%zu].gain.force_rmse_after_N", s);
 	fputs("</tr>\n", html->out);
 	html_table_end(html);
 	if (g->no_force_gain) {
@@ -305,9 +310,9 @@ void html_series(const struct html *html, size_t index)
 		html_element(html, "p", series->summary);
 	char text[160];
 	snprintf(text, sizeof text,
-			 series->every > 1  ? "%zu samples; %zu left out; screening looked at every %zu-th."
-			 : series->left_out ? "%zu samples; %zu left out."
-								: "%zu samples.",
+			 series->every > 1  ? "%zu readings; %zu left out; screening looked at every %zu-th."
+			 : series->left_out ? "%zu readings; %zu left out."
+								: "%zu readings.",
 			 series->samples, series->left_out, series->every);
 	html_element(html, "p class=\"soft\"", text);
 	base_table(html, series, index);

@@ -92,11 +92,12 @@ void picture_evidence(FILE *script, const struct picture *picture)
 				!tested                               ? COLOUR_DIM
 				: is_cause(series, sorted[i]->effect) ? COLOUR_AFTER
 													  : "black");
+		/* Short bars have theirs behind the line of strong evidence, which would cross it. */
 		put_label(script,
 				  sorted[i]->why ? "not testable"
 				  : tested       ? cli_bic(-sorted[i]->delta_bic, bic) + (sorted[i]->delta_bic < 0)
 								 : "not tried",
-				  end, y, "left offset 0.4,0", tested ? "black" : COLOUR_DIM);
+				  fmax(end, stretch(10)), y, "left offset 0.4,0", tested ? "black" : COLOUR_DIM);
 	}
 	fprintf(script,
 			"plot $bars using 2:4:2:3:4:5 with boxxyerror lc rgb '%s', "

@@ -374,7 +374,7 @@ std::string summary_of(const tactus_diagnosed &s)
 		snprintf(buffer, sizeof buffer, "; %s error falls by %.0f %% on data that no choice has seen", s.gain->output,
 				 100 * s.gain->reduction);
 		gain = buffer;
-		if (std::isfinite(s.gain->force_rmse_before_N)) {
+		if (std::isfinite(s.gain->force_rmse_before_N) && std::isfinite(s.gain->force_rmse_after_N)) {
 			snprintf(buffer, sizeof buffer,
 					 s.gain->no_force_gain ? ", but not in newtons (%.3g N to %.3g N)" : " (%.3g N to %.3g N)",
 					 s.gain->force_rmse_before_N, s.gain->force_rmse_after_N);

@@ -45,8 +45,9 @@ std::string quantity(double value, const std::string &unit)
 {
 	static const char *const prefixes[] = {"f", "p", "n", "µ", "m", "", "k", "M", "G"};
 	char text[64];
-	const double size = std::abs(value);
-	int power = size > 0 && std::isfinite(size) ? int(std::floor(std::log10(size) / 3)) : 0;
+	snprintf(text, sizeof text, "%.2e", std::abs(value)); /* as it will be shown: 999.9 fF is 1 pF */
+	const double size = std::isfinite(value) ? std::stod(text) : std::abs(value);
+	int power = size > 0 && std::isfinite(size) ? int(std::floor(std::log10(size * (1 + 1e-12)) / 3)) : 0;
 	static const char *const prefixed[] = {"S", "F", "V", "A", "ohm", "Hz", "s", "N", "Nm", "m", "rad", "Pa"};
 	const bool known = std::any_of(std::begin(prefixed), std::end(prefixed), [&](const char *p) { return unit == p; });
 	const char *sign = value < 0 ? "−" : "";

@@ -766,6 +766,27 @@ left_over() {
 	jq -e '.verdict == "unexplained" and any(.series[0].unexplained[].text; test("comes in bursts"))' said.json
 }
 
+@test "numbers as people read them: no thousand of a prefix, noise by its multiple, all that can be explained" {
+	page() { tactus diagnose "$@" | tr -s '\n ' ' '; }
+	made 'g = 1e-13 * f + (i % 2 ? 1 : -1) * 0.9999e-12' >tiny.csv # off by 999.9 fS
+	[[ $(page tiny.csv) == *"off by 1.0 pS rms, "* ]] || fail "$(page tiny.csv)"
+	[[ $(page "$creep") =~ readings\).*\ [0-9.]+\ ×\ the\ noise\ floor.*\;\ (all|[0-9.]+\ %)\ of\ what\ can\ be\ explained ]] || fail "$(page "$creep")"
+	for args in "$creep" tiny.csv "$plain -m $model" "$plain -m $stale"; do
+		if [[ $(page $args) =~ %\ of\ the\ noise|1[0-9][0-9]\ %\ of\ what|samples ]]; then fail "$args"; fi
+	done
+}
+
+@test "newtons that are not known once channels are coupled are said in words" {
+	awk 'BEGIN { srand(4); print "time_s,sequence,channel,force_N,conductance_S"
+		for (i = 0; i < 400; i++) {
+			for (c = 1; c <= 2; c++) if (i % (20 * c + 7) == 0) f[c] = 100 * rand()
+			for (c = 1; c <= 2; c++) printf "%.10g,%d,%d,%.6g,%.8g\n", i / 10, i, c, f[c], 1e-6 + 4e-7 * (f[c] + 0.3 * f[3 - c]) + 1e-7 * (rand() + rand() - 1) } }' >coupled.csv
+	run --separate-stderr tactus diagnose coupled.csv
+	prints "2 of 2 sensors: mechanical-crosstalk"
+	[[ $(tr -s '\n ' ' ' <<<"$output") == *"not known in newtons, the channels being coupled"* ]] || fail "a dash alone"
+	tactus diagnose coupled.csv --json | jq -e '.summary + .series[0].summary | test("nan") | not'
+}
+
 @test "colour on a terminal, but not with NO_COLOR" {
 	type script >/dev/null || skip "script(1) is not installed"
 	TERM=xterm script -qec "tactus diagnose $creep" /dev/null >on
