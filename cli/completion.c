@@ -11,6 +11,14 @@ static void words(FILE *out, const char *choices)
 		fputc(*choices == '|' ? ' ' : *choices, out);
 }
 
+static void effects(FILE *out)
+{
+	const tactus_domain *domain;
+	for (size_t d = 0; (domain = tactus_domain_at(d)); d++)
+		for (size_t i = 0; i < tactus_domain_effects(domain); i++)
+			fprintf(out, "%s ", tactus_effect_name(tactus_domain_effect(domain, i)));
+}
+
 /* Cases "command:--option)" for what the argument of an option can be. */
 static void option_cases(FILE *out, const struct cli_command *command)
 {
@@ -27,6 +35,10 @@ static void option_cases(FILE *out, const struct cli_command *command)
 		} else if (option->kind == CLI_CHOICE) {
 			fputs("_tactus_words \"", out);
 			words(out, option->unit);
+			fputc('"', out);
+		} else if (!strcmp(option->name, "effects")) {
+			fputs("_tactus_list \"", out);
+			effects(out);
 			fputc('"', out);
 		} else {
 			fputc(':', out);
@@ -49,6 +61,13 @@ void cli_completion_bash(FILE *out)
 	fputs(
 		"# bash completion of tactus; made by `tactus --completion bash`.\n"
 		"_tactus_words() { mapfile -t COMPREPLY < <(compgen -W \"$1\" -- \"$word\"); }\n"
+		"# One word of several with commas between.\n"
+		"_tactus_list() {\n"
+		"\tlocal before=\n"
+		"\t[[ $word == *,* ]] && before=${word%,*},\n"
+		"\tmapfile -t COMPREPLY < <(compgen -P \"$before\" -W \"$1\" -- \"${word##*,}\")\n"
+		"\tcompopt -o nospace 2>/dev/null\n"
+		"}\n"
 		"_tactus_files() {\n"
 		"\tcompopt -o filenames 2>/dev/null\n"
 		"\tmapfile -t COMPREPLY < <(compgen -f -- \"$word\")\n"

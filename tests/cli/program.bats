@@ -176,6 +176,8 @@ complete_words() {
 	[ "$(complete_words tactus help jo)" = join ]
 	[ "$(complete_words tactus convert --dec)" = --decimal-comma ]
 	[ "$(complete_words tactus convert --format j)" = jsonl ]
+	[ "$(complete_words tactus fit --effects cr)" = creep ]
+	[ "$(complete_words tactus fit --effects hysteresis,cr)" = hysteresis,creep ]
 	touch run.csv
 	[ "$(complete_words tactus convert ru)" = run.csv ]
 	[ "$(complete_words tactus force -m ru)" = run.csv ]
