@@ -462,10 +462,7 @@ std::vector<Dependence> Decider::map(const Fit &fit) const
 	}
 	std::sort(found.begin(), found.end(),
 			  [](const Dependence &a, const Dependence &b) { return a.whitened > b.whitened; });
-	VectorXd y;
-	problem.simulate(problem.levelled(fit.hypothesis, Rows::train), y);
-	VectorXd raw = problem.measured - y;
-	problem.mask(raw, Rows::train);
+	const VectorXd raw = problem.left(problem.levelled(fit.hypothesis, Rows::train));
 	for (Dependence &dep : found)
 		dep.explained = explained_share(problem, raw, *dep.group);
 	return found;
@@ -501,13 +498,7 @@ double Decider::wandering(const Cause &cause) const
 {
 	if (!has_instants(cause.effect))
 		return 0;
-	auto rest = [&](const Hypothesis &h) {
-		VectorXd y;
-		problem.simulate(problem.levelled(h, Rows::train), y);
-		y = problem.measured - y;
-		problem.mask(y, Rows::train);
-		return y.squaredNorm();
-	};
+	auto rest = [&](const Hypothesis &h) { return problem.left(problem.levelled(h, Rows::train)).squaredNorm(); };
 	const double share = 1 - rest(d.final.hypothesis) / rest(cause.without.hypothesis);
 	const bool foretold =
 		paired(problem, problem.held_out(cause.without), problem.held_out(d.final)) > limits.jump_foretold;
@@ -517,10 +508,7 @@ double Decider::wandering(const Cause &cause) const
 /* More than noise without a column that shows what: the noise was judged beside more functions than are mapped. */
 void Decider::strays()
 {
-	VectorXd y;
-	problem.simulate(problem.levelled(d.base.hypothesis, Rows::train), y);
-	VectorXd raw = problem.measured - y;
-	problem.mask(raw, Rows::train);
+	const VectorXd raw = problem.left(problem.levelled(d.base.hypothesis, Rows::train));
 	std::vector<double> square(problem.output_count, 0);
 	for (const Run &run : problem.runs)
 		square[run.output] += raw.segment(run.first, run.count).squaredNorm();
@@ -644,17 +632,11 @@ void Decider::staleness()
 	}
 	/* By plain least squares something must have moved too: what is unlike the model bends a base that slow noise
 	 * weighs. */
-	VectorXd y;
-	auto raw = [&](const Hypothesis &h) {
-		problem.simulate(h, y);
-		VectorXd r = problem.measured - y;
-		problem.mask(r, Rows::train);
-		return r.squaredNorm();
-	};
 	Hypothesis level = now.hypothesis;
 	level.base = fixed.base;
 	level = problem.levelled(level, Rows::train);
-	if (!d.moved.slots.empty() && !(raw(level) < (1 - 0.5 * limits.share) * raw(fixed))) {
+	if (!d.moved.slots.empty() &&
+		!(problem.left(level).squaredNorm() < (1 - 0.5 * limits.share) * problem.left(fixed).squaredNorm())) {
 		d.moved = Moved();
 		return;
 	}

@@ -287,6 +287,15 @@ Fit Problem::fit(const Hypothesis &start, Rows which) const
 	return result;
 }
 
+VectorXd Problem::left(const Hypothesis &h) const
+{
+	VectorXd y;
+	simulate(h, y);
+	y = measured - y;
+	mask(y, Rows::train);
+	return y;
+}
+
 Hypothesis Problem::levelled(const Hypothesis &h, Rows which) const
 {
 	Hypothesis result = h;

@@ -69,10 +69,7 @@ size_t tactus_gate_listed(const tactus_gate_found *found)
 
 const double *tactus_gate_time(const tactus_series *series)
 {
-	for (size_t s = 0; s < series->domain->signal_count && series->has_clock; s++)
-		if (series->domain->signals[s].role == TACTUS_ROLE_TIME)
-			return series->signal[s];
-	return NULL;
+	return series->has_clock ? tactus_series_clock(series) : NULL;
 }
 
 const char *tactus_gate_row(const tactus_table *recording, size_t row, double time_s, char text[TACTUS_GATE_TEXT])
@@ -122,20 +119,10 @@ bool tactus_gate_explained(const tactus_series *series, const char *effect)
 
 /* ---- views ---- */
 
-/* Signal of the domain's o-th output, or its signal_count. */
-static size_t output_signal(const tactus_domain *domain, size_t o)
-{
-	size_t s = 0;
-	for (; s < domain->signal_count; s++)
-		if (domain->signals[s].role == TACTUS_ROLE_OUTPUT && o-- == 0)
-			break;
-	return s;
-}
-
 const double *tactus_gate_output(const tactus_series *series, size_t o)
 {
-	size_t s = output_signal(series->domain, o);
-	return s < series->domain->signal_count && series->recorded[s] ? series->signal[s] : NULL;
+	size_t s = tactus_output_signal(series->domain, o);
+	return s != SIZE_MAX && series->recorded[s] ? series->signal[s] : NULL;
 }
 
 /* The base model at the start of a fit, over the series: expected[o][n]; outputs it has not stay NULL. */
@@ -147,8 +134,8 @@ static int simulate_base(const tactus_series *series, double *expected[TACTUS_OU
 	for (size_t p = 0; p < domain->base_count; p++)
 		base[p] = domain->base[p].start;
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
-		size_t s = output_signal(domain, o);
-		if (s == domain->signal_count)
+		size_t s = tactus_output_signal(domain, o);
+		if (s == SIZE_MAX)
 			continue;
 		signal[s] = expected[o] = malloc((series->n + 1) * sizeof **expected);
 		if (!expected[o])

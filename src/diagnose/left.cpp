@@ -8,6 +8,7 @@
 #include <unsupported/Eigen/FFT>
 
 #include "diagnose/limits.hpp"
+#include "model/effects/effect_util.h"
 
 namespace tactus::explain
 {
@@ -15,17 +16,12 @@ namespace tactus::explain
 namespace
 {
 
-const double pi = 3.14159265358979323846;
-
 /* ---- swings ---- */
 
 /* Clock of a run, if it has one that only goes forward and without long gaps; else empty: rows are counted. */
 std::vector<double> clock_of(const Problem &problem, const Run &run)
 {
-	const double *clock = nullptr;
-	for (size_t s = 0; s < problem.domain->signal_count; s++)
-		if (problem.domain->signals[s].role == TACTUS_ROLE_TIME)
-			clock = problem.segments[run.segment]->signal[s];
+	const double *clock = tactus_series_clock(problem.segments[run.segment]);
 	std::vector<double> t;
 	double longest = 0;
 	for (Index i = 0; clock && i < run.count; i++) {
@@ -74,7 +70,7 @@ std::vector<double> power(const std::vector<double> &t, const double *x, Index m
 	for (const double v : even)
 		mean += v / double(m);
 	for (Index i = 0; i < m; i++)
-		even[size_t(i)] = (even[size_t(i)] - mean) * (1 - std::cos(2 * pi * (double(i) + 0.5) / double(m)));
+		even[size_t(i)] = (even[size_t(i)] - mean) * (1 - std::cos(2 * TACTUS_PI * (double(i) + 0.5) / double(m)));
 	std::vector<std::complex<double>> transformed;
 	Eigen::FFT<double>().fwd(transformed, even);
 	std::vector<double> p(1, 0);
@@ -96,7 +92,7 @@ std::vector<double> bound_of(const std::vector<double> &p)
 	auto mean = [&](Index from, Index count) {
 		return (sum[size_t(from + count)] - sum[size_t(from)]) / double(count);
 	};
-	auto slope = [&](Index k) { return std::pow(std::sin(0.5 * pi * double(k) / double(n)), 2); };
+	auto slope = [&](Index k) { return std::pow(std::sin(0.5 * TACTUS_PI * double(k) / double(n)), 2); };
 	const Index apart = 4; /* what a taper lets through of a line */
 	for (Index g = 1; g < n; g++) {
 		const Index half = std::max(limits.swing_smooth, g / 10), below = g - half - apart;

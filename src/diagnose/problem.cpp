@@ -28,14 +28,6 @@ size_t rank_of(const tactus_domain *domain, const tactus_effect *effect)
 	return i;
 }
 
-size_t output_signal(const tactus_domain *domain, size_t output)
-{
-	for (size_t s = 0; s < domain->signal_count; s++)
-		if (domain->signals[s].role == TACTUS_ROLE_OUTPUT && output-- == 0)
-			return s;
-	return SIZE_MAX;
-}
-
 /* What an effect does to a sample depends on nothing but that sample, and not on its time. */
 bool memoryless(const Part &part)
 {
@@ -131,11 +123,11 @@ Problem::Problem(std::vector<const tactus_series *> s, const std::vector<std::ve
 		high = std::fmax(high, tactus_series_maximum(series, int(input)));
 	}
 	input_range = high > low ? high - low : 0;
-	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX && output_signal(domain, o) != SIZE_MAX; o++) {
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX && tactus_output_signal(domain, o) != SIZE_MAX; o++) {
 		output_count = o + 1;
 		const size_t at = values.size();
 		for (size_t k = 0; k < segments.size(); k++) {
-			const double *y = segments[k]->signal[output_signal(domain, o)];
+			const double *y = segments[k]->signal[tactus_output_signal(domain, o)];
 			Run run{o, k, Index(values.size()), 0};
 			for (size_t i = 0; y && i < segments[k]->n; i++)
 				if (use[k][o][i]) {
@@ -172,10 +164,7 @@ Problem::Problem(std::vector<const tactus_series *> s, const std::vector<std::ve
 
 size_t Problem::input_signal() const
 {
-	for (size_t s = 0; s < domain->signal_count; s++)
-		if (domain->signals[s].role == TACTUS_ROLE_INPUT)
-			return s;
-	return 0;
+	return tactus_role_signal(domain, TACTUS_ROLE_INPUT);
 }
 
 int Problem::covariate_of(const tactus_effect *effect) const
@@ -294,7 +283,7 @@ bool Problem::simulate(const Hypothesis &h, VectorXd &y) const
 		double *signal[TACTUS_SIGNALS_MAX];
 		std::copy_n(few ? kinds[k].signal : segments[k]->signal, TACTUS_SIGNALS_MAX, signal);
 		for (size_t o = 0; o < output_count; o++)
-			signal[output_signal(domain, o)] = outputs[o] ? buffer.data() + o * n : nullptr;
+			signal[tactus_output_signal(domain, o)] = outputs[o] ? buffer.data() + o * n : nullptr;
 		tactus_chain_reset(chain.get());
 		if (tactus_chain_run(chain.get(), n, signal) != TACTUS_OK)
 			return false;
@@ -405,7 +394,6 @@ double &Problem::value(Hypothesis &h, const Slot &slot)
  */
 void Problem::estimate_blur(const VectorXd &y)
 {
-	input_noise = 0;
 	std::fill_n(blur, TACTUS_OUTPUTS_MAX, 0.0);
 	if (!domain->loaded)
 		return;
@@ -447,9 +435,8 @@ void Problem::estimate_blur(const VectorXd &y)
 		if (product > 5 * std::sqrt(square))
 			best = std::fmax(best, std::fmin(product / count, quiet));
 	}
-	input_noise = std::sqrt(best);
 	for (size_t o = 0; o < output_count; o++)
-		blur[o] = std::abs(slope[o]) * input_noise;
+		blur[o] = std::abs(slope[o]) * std::sqrt(best);
 }
 
 double Problem::floor(size_t output) const

@@ -113,7 +113,7 @@ class Problem
 	size_t output_count = 0;
 	Noise noise;
 	/* What the input's own noise does to each output, scaled rms: a reference may be worse than what it calibrates. */
-	double blur[TACTUS_OUTPUTS_MAX] = {}, input_noise = 0;
+	double blur[TACTUS_OUTPUTS_MAX] = {};
 	std::vector<char> excluded;     /* per row: an outlier */
 	Index training = 0;             /* rows that train */
 	std::vector<Index> training_of; /* of them, those of each output, which follow one another */
@@ -165,10 +165,12 @@ class Problem
 	 * level and a slope that nobody would draw. As it is where that changes little.
 	 */
 	Hypothesis levelled(const Hypothesis &h, Rows which) const;
-	/* Estimates input_noise and blur from the residual at y (scaled): what the input says and the readings do not. */
+	/* Estimates blur from the residual at y (scaled): what the input says and the readings do not. */
 	void estimate_blur(const VectorXd &y);
 	/* What cannot be simulated better: an output's noise, the input's where that is larger with it; scaled rms. */
 	double floor(size_t output) const;
+	/* What a hypothesis leaves of the rows that train, neither whitened nor weighted; 0 in the others. */
+	VectorXd left(const Hypothesis &h) const;
 	/* Squares of an output's whitened training rows that are the input's noise and more. */
 	double blurred(size_t output) const;
 	/* Residual and derivatives where it stands, without moving. */

@@ -45,10 +45,7 @@ std::vector<double> instants_of(const Problem &problem, size_t count)
 {
 	std::vector<double> values;
 	const tactus_series *series = problem.segments.front();
-	const double *time = nullptr;
-	for (size_t s = 0; s < series->domain->signal_count; s++)
-		if (series->domain->signals[s].role == TACTUS_ROLE_TIME)
-			time = series->signal[s];
+	const double *time = tactus_series_clock(series);
 	for (size_t k = 0; time && k < count; k++)
 		values.push_back(time[size_t((double(k) + 0.5) / double(count) * double(series->n))]);
 	return values;

@@ -57,6 +57,8 @@ double tactus_series_minimum(const tactus_series *series, int signal);
 double tactus_series_maximum(const tactus_series *series, int signal);
 size_t tactus_series_distinct(const tactus_series *series, int signal, size_t stop_at);
 double tactus_series_duration_s(const tactus_series *series);
+/* The values of the time, or NULL. */
+const double *tactus_series_clock(const tactus_series *series);
 /* The input at an instant, on the line between its neighbours; NaN outside the series, which has a clock. */
 double tactus_series_load_at(const tactus_series *series, double time_s);
 size_t tactus_series_reversals(const tactus_series *series, int signal);

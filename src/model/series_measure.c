@@ -37,10 +37,14 @@ size_t tactus_series_distinct(const tactus_series *series, int signal, size_t st
 
 double tactus_series_duration_s(const tactus_series *series)
 {
-	for (size_t s = 0; series->has_clock && s < series->domain->signal_count; s++)
-		if (series->domain->signals[s].role == TACTUS_ROLE_TIME)
-			return tactus_series_maximum(series, (int)s) - tactus_series_minimum(series, (int)s);
-	return 0;
+	int time = (int)tactus_role_signal(series->domain, TACTUS_ROLE_TIME);
+	return series->has_clock ? tactus_series_maximum(series, time) - tactus_series_minimum(series, time) : 0;
+}
+
+const double *tactus_series_clock(const tactus_series *series)
+{
+	size_t time = tactus_role_signal(series->domain, TACTUS_ROLE_TIME);
+	return time == SIZE_MAX ? NULL : series->signal[time];
 }
 
 size_t tactus_series_reversals(const tactus_series *series, int signal)
@@ -66,7 +70,7 @@ size_t tactus_series_reversals(const tactus_series *series, int signal)
 
 double tactus_series_load_at(const tactus_series *series, double time_s)
 {
-	const double *time = series->signal[tactus_role_signal(series->domain, TACTUS_ROLE_TIME)],
+	const double *time = tactus_series_clock(series),
 				 *load = series->signal[tactus_role_signal(series->domain, TACTUS_ROLE_INPUT)];
 	size_t low = 0, high = series->n - 1;
 	if (!(time_s >= time[low]) || !(time_s <= time[high]))

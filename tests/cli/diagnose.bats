@@ -448,6 +448,15 @@ made() {
 	}"
 }
 
+# computed NAMES VALUES <STATEMENTS: a recording of what numpy computes.
+computed() {
+	{
+		echo 'import numpy as np'
+		cat
+		echo "np.savetxt('/dev/stdout', np.column_stack([$2]), '%.8g', ',', header='$1', comments='')"
+	} | "$PYTHON" -
+}
+
 @test "ten rows, two rows, one row" {
 	for n in 10 2 1; do
 		made "" $n >few.csv
@@ -610,8 +619,7 @@ made() {
 }
 
 @test "a lag of second order is a lag, with no time offset beside it" {
-	"$PYTHON" - >two_poles.csv <<-'EOP'
-		import numpy as np
+	computed "time_s,force_N,conductance_S" "t[::fine], load[::fine], g" >two_poles.csv <<-'EOP'
 		from scipy.signal import lfilter
 		rng = np.random.default_rng(5)
 		dt, fine, n = 2e-3, 20, 8000
@@ -622,24 +630,17 @@ made() {
 		    k = 1 - np.exp(-dt / fine / tau)
 		    shown = lfilter([k], [1, k - 1], shown, zi=[(1 - k) * shown[0]])[0]
 		g = 1e-6 + 4e-7 * shown[::fine] + 4e-8 * rng.standard_normal(n)
-		print("time_s,force_N,conductance_S")
-		for row in zip(t[::fine], load[::fine], g):
-		    print("%.6g,%.8g,%.8g" % row)
 	EOP
 	tactus diagnose two_poles.csv --json >said.json
 	jq -e '.series[0] | [.causes[].effect] == ["lag"] and .structure_remains' said.json
 }
 
 @test "what a time offset costs in newtons is measured at the re-stamped times" {
-	"$PYTHON" - >offset.csv <<-'EOP'
-		import numpy as np
+	computed "time_s,force_N,conductance_S" "t, load(t), g" >offset.csv <<-'EOP'
 		rng = np.random.default_rng(6)
 		t = np.arange(4000) * 0.01
 		load = lambda t: 40 + 20 * np.sin(2.1 * t) + 10 * np.sin(5.3 * t + 1)
 		g = 1e-6 + 4e-7 * load(t - 0.05) + 4e-8 * rng.standard_normal(len(t))
-		print("time_s,force_N,conductance_S")
-		for row in zip(t, load(t), g):
-		    print("%.6g,%.8g,%.8g" % row)
 	EOP
 	tactus diagnose offset.csv --json >said.json
 	jq -e '.series[0].causes[0].effect == "time-offset"' said.json
@@ -715,16 +716,12 @@ left_over() {
 }
 
 @test "both slopes have moved: both are named, and nothing that moves one output alone is a rival" {
-	"$PYTHON" - >slopes.csv <<-'EOP'
-		import numpy as np
+	computed "time_s,force_N,conductance_S,capacitance_F" "t, f, g, c" >slopes.csv <<-'EOP'
 		rng = np.random.default_rng(7)
 		t = np.arange(3000) * 0.1
 		f = 50 + 40 * np.sin(0.2 * t) + 5 * np.sin(1.3 * t)
 		g = 1e-6 + 4.5e-7 * f + 1e-6 * rng.standard_normal(len(t))
 		c = 2e-11 + 3.3e-12 * f + 2e-13 * rng.standard_normal(len(t))
-		print("time_s,force_N,conductance_S,capacitance_F")
-		for row in zip(t, f, g, c):
-		    print("%.6g,%.8g,%.8g,%.8g" % row)
 	EOP
 	cat >slopes.toml <<-'EOM'
 		kind = "model"
