@@ -117,12 +117,17 @@ const char *tactus_columns_where(const tactus_columns *columns)
 	return text;
 }
 
+static int fail_empty(const tactus_columns *columns, const char *name)
+{
+	return tactus_fail(TACTUS_ERR_INPUT, "%scolumn '%s' has no number in it", tactus_columns_where(columns), name);
+}
+
 int tactus_columns_fail_missing(const tactus_columns *columns, const char *name)
 {
 	const tactus_table *table = columns->table;
 	const char *where = tactus_columns_where(columns);
 	if (tactus_table_find(table, name) >= 0)
-		return tactus_fail(TACTUS_ERR_INPUT, "%scolumn '%s' has no number in it", where, name);
+		return fail_empty(columns, name);
 	if ((strcmp(name, "conductance_S") == 0 || strcmp(name, "capacitance_F") == 0) &&
 		(tactus_table_find(table, "amplitude_V") >= 0 || tactus_table_find(table, "detector_amplitude_V") >= 0 ||
 		 tactus_table_find(table, "detector_dc_V") >= 0))
@@ -152,7 +157,7 @@ static bool there(const tactus_columns *columns, const char *name, const char *r
 	if (!name || (values && r < rows))
 		return true;
 	if (tactus_table_find(columns->table, name) >= 0)
-		tactus_columns_fail_missing(columns, name);
+		fail_empty(columns, name);
 	else
 		tactus_fail(TACTUS_ERR_INPUT, "%sno column '%s', which was to be the %s", tactus_columns_where(columns), name,
 					role);
