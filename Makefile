@@ -248,7 +248,7 @@ $(BUILD)/fake_libusb.so: tests/peers/fake_libusb.c
 SOURCES_C := $(LIB_C) $(CLI_C) $(UNIT_C) $(RIG_C) $(wildcard tests/install/*.c tests/peers/*.c tests/fuzz/*.c)
 SOURCES := $(SOURCES_C) $(LIB_CXX) $(HEADERS) \
 	$(wildcard cli/*.h src/*/*.h src/*/*/*.h src/*/*/*/*.h tests/*/*.h tests/*/*.cpp)
-SCRIPTS := $(shell grep -lE '^\#!/bin/(ba)?sh|^\#!/usr/bin/env bash' scripts/* tests/rig/*.sh .ci/run 2>/dev/null)
+SCRIPTS := $(shell grep -lE '^\#!/bin/(ba)?sh|^\#!/usr/bin/env bash' scripts/* scripts/figures/*.sh tests/rig/*.sh .ci/run 2>/dev/null)
 
 .PHONY: check
 check: ## formatting, clang-tidy, cppcheck, shellcheck, headers; any finding is an error
