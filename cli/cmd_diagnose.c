@@ -239,8 +239,7 @@ static const struct cli_option options[] = {
 	{"exit-verdict", 0, CLI_FLAG, NULL, NULL,
 	 "exit with 10 cause found, 11 nothing wrong, 12 unexplained, 13 ambiguous, 14 stale calibration, 15 bad "
 	 "recording"},
-	{"device", 0, CLI_STRING, "URI", NULL,
-	 "the device that the next experiment is written for (default: the recording's)"},
+	{"device", 0, CLI_STRING, "URI", NULL, "the device that the next experiment is written for (default: the bench)"},
 	{"seed", 0, CLI_INTEGER, "N", NULL, "seed of the resampling behind the intervals (default 1)"},
 	{"jobs", 0, CLI_INTEGER, "N", NULL, "threads (default 1); the result is the same for any number"},
 	CLI_OPTIONS_DOMAIN,

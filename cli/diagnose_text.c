@@ -334,8 +334,7 @@ static void say_next(const struct page *page)
 	bool extends = verdict == TACTUS_VERDICT_CAUSE_FOUND || verdict == TACTUS_VERDICT_STALE_CALIBRATION;
 	if (experiment) {
 		page_item(page, "Next", "%s%s", experiment->text, full_stop(experiment->text));
-		if (experiment->command)
-			command_line(page, experiment->command);
+		command_line(page, experiment->command);
 	} else if (verdict == TACTUS_VERDICT_BAD_RECORDING) {
 		page_item(page, "Next",
 				  "mend what the problem is and record again; `tactus show` says what is in a recording.");

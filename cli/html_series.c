@@ -299,8 +299,7 @@ static void experiment(const struct html *html, const tactus_diagnosed *series)
 		return;
 	html_element(html, "h3", "The next experiment");
 	html_element(html, "p", e->text);
-	if (e->command)
-		html_element(html, "pre", e->command);
+	html_element(html, "pre", e->command);
 }
 
 void html_series(const struct html *html, size_t index)

@@ -104,8 +104,7 @@ typedef struct {
 typedef struct {
 	const char *const *separates;
 	size_t separates_count;
-	const char *command; /**< complete: it can be pasted, but for the word DEVICE where the recording names no device;
-							  NULL where no scan is known to repeat it, and the text says all */
+	const char *command; /**< complete: it can be pasted */
 	const char *text;
 	double expected_delta_bic; /**< evidence that it should give; NaN where not computed */
 } tactus_experiment;

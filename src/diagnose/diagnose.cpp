@@ -350,23 +350,16 @@ int Diagnosis::extended()
 	return TACTUS_OK;
 }
 
-/*
- * The URI that the next experiment is written for: as asked, else that of the recording if a scan would take it; of a
- * simulated bench that is elsewhere now, another simulated one. Nothing else is a guess that one could paste: NULL.
- */
+/* The URI that the next experiment is written for: as asked, else that of the recording if a scan would take it. */
 const char *Diagnosis::scanned() const
 {
 	const tactus_metadata *metadata = tactus_table_metadata(recordings.front().table);
 	if (options.device)
 		return options.device;
-	const char *found = nullptr;
 	for (const char *key : {"uri", "device"})
-		if (const char *uri = tactus_metadata_get(metadata, key); uri) {
-			if (tactus_device_accepts(uri))
-				return uri;
-			found = strncmp(uri, "sim:", 4) == 0 ? "sim:" : found;
-		}
-	return found;
+		if (const char *uri = tactus_metadata_get(metadata, key); uri && tactus_device_accepts(uri))
+			return uri;
+	return "sim:";
 }
 
 int Diagnosis::run()

@@ -151,7 +151,7 @@ double evidence_of(const Work &work, Synthetic &s, const Hypothesis &a, const Hy
 std::string scan_command(const Work &work, const char *device, const std::string &rest)
 {
 	std::string command = "tactus scan ";
-	const std::string uri = device ? device : "DEVICE"; /* which no scan takes for anything */
+	const std::string uri = device;
 	command += uri.find_first_of(" \t\"'") == std::string::npos ? uri : "'" + uri + "'";
 	if (work.said_channel() > 0)
 		command += " --channels " + std::to_string(work.channel);
@@ -230,14 +230,8 @@ std::string text_of(const tactus_effect *effect)
 								  : std::string(effect->name) + " needs " + effect->needs;
 }
 
-/* True if nothing of ours made this recording and nothing of ours is loaded: no scan is known to repeat it. */
-bool foreign(const Work &work, const char *device)
-{
-	return !device && work.problem->domain->loaded && !work.pressed();
-}
-
-const tactus_experiment *made(Store &store, const Work &work, const char *device, const std::vector<std::string> &names,
-							  const std::string &command, const std::string &text, double evidence)
+const tactus_experiment *made(Store &store, const std::vector<std::string> &names, const std::string &command,
+							  const std::string &text, double evidence)
 {
 	std::vector<const char *> list;
 	list.reserve(names.size());
@@ -246,14 +240,14 @@ const tactus_experiment *made(Store &store, const Work &work, const char *device
 	tactus_experiment e{};
 	e.separates_count = list.size();
 	e.separates = store.keep(std::move(list));
-	e.command = foreign(work, device) ? nullptr : store.text(command);
-	e.text = store.text(device || !e.command ? text : text + " (DEVICE: yours; `tactus devices` lists them)");
+	e.command = store.text(command);
+	e.text = store.text(text);
 	e.expected_delta_bic = evidence;
 	return store.keep(std::vector<tactus_experiment>{e});
 }
 
 /* Where another column plays the load nothing here can move it: in words, at the same pace. */
-std::string by_hand(const Work &work, const char *device)
+std::string by_hand(const Work &work)
 {
 	const tactus_series *series = work.problem->segments.front();
 	const int input = int(work.problem->input_signal());
@@ -261,9 +255,8 @@ std::string by_hand(const Work &work, const char *device)
 	const std::string unit = suffix == std::string::npos ? "" : work.input_name.substr(suffix + 1);
 	if (work.pressed() || !work.problem->domain->loaded)
 		return "";
-	return std::string(foreign(work, device) ? "; record again while moving " : "; meanwhile move ") + work.input_name +
-		   " from " + quantity(tactus_series_minimum(series, input), unit) + " to " +
-		   quantity(tactus_series_maximum(series, input), unit) + " and back, twice, 20 s each way";
+	return "; meanwhile move " + work.input_name + " from " + quantity(tactus_series_minimum(series, input), unit) +
+		   " to " + quantity(tactus_series_maximum(series, input), unit) + " and back, twice, 20 s each way";
 }
 
 /* What can only be told by varying something that no load protocol moves. */
@@ -308,7 +301,7 @@ const tactus_experiment *to_test_more(Store &store, const Work &work, const char
 	std::string text = "this recording could not test ";
 	for (size_t i = 0; i < names.size(); i++)
 		text += (i ? ", " : "") + names[i];
-	return made(store, work, device, names, command_of(work, device, choice.steps, choice.rate_Hz),
+	return made(store, names, command_of(work, device, choice.steps, choice.rate_Hz),
 				text + "; this one can: " + choice.item->what, NAN);
 }
 
@@ -337,20 +330,20 @@ const tactus_experiment *propose(Store &store, const Work &work, const char *dev
 			char expected[96];
 			snprintf(expected, sizeof expected, "; expected evidence between %s and %s: ΔBIC −%.0f", names[0].c_str(),
 					 first->name.c_str(), choice.evidence);
-			return made(store, work, device, names, command_of(work, device, choice.steps, choice.rate_Hz),
+			return made(store, names, command_of(work, device, choice.steps, choice.rate_Hz),
 						words_of(*choice.item, names[0], first->name) + expected, choice.evidence);
 		}
 	}
 	if (first)
-		return made(store, work, device, names, by_covariate(work, device, first->effect),
-					text_of(first->effect) + by_hand(work, device), NAN);
+		return made(store, names, by_covariate(work, device, first->effect), text_of(first->effect) + by_hand(work),
+					NAN);
 	const std::string apart = effect && effect->twin_separated_by ? effect->twin_separated_by
 							  : d.moved.separated_by              ? d.moved.separated_by
 																  : "another experiment";
 	std::string command = by_covariate(work, device, effect);
 	if (work.problem->domain->loaded)
 		command = scan_command(work, device, "--loads standard --mode dc,ac");
-	return made(store, work, device, names, command, "what tells them apart: " + apart, NAN);
+	return made(store, names, command, "what tells them apart: " + apart, NAN);
 }
 
 } // namespace tactus::explain
