@@ -350,7 +350,8 @@ int Diagnosis::extended()
 	return TACTUS_OK;
 }
 
-/* The URI that the next experiment is written for: as asked, else that of the recording if a scan would take it. */
+/* The URI that the next experiment is written for: as asked, else that of the recording if a scan would take it; NULL.
+ */
 const char *Diagnosis::scanned() const
 {
 	const tactus_metadata *metadata = tactus_table_metadata(recordings.front().table);
@@ -359,7 +360,7 @@ const char *Diagnosis::scanned() const
 	for (const char *key : {"uri", "device"})
 		if (const char *uri = tactus_metadata_get(metadata, key); uri && tactus_device_accepts(uri))
 			return uri;
-	return "sim:";
+	return nullptr;
 }
 
 int Diagnosis::run()

@@ -151,7 +151,7 @@ double evidence_of(const Work &work, Synthetic &s, const Hypothesis &a, const Hy
 std::string scan_command(const Work &work, const char *device, const std::string &rest)
 {
 	std::string command = "tactus scan ";
-	const std::string uri = device;
+	const std::string uri = device ? device : "sim:"; /* a command that can be pasted, whatever made the recording */
 	command += uri.find_first_of(" \t\"'") == std::string::npos ? uri : "'" + uri + "'";
 	if (work.said_channel() > 0)
 		command += " --channels " + std::to_string(work.channel);
@@ -230,8 +230,8 @@ std::string text_of(const tactus_effect *effect)
 								  : std::string(effect->name) + " needs " + effect->needs;
 }
 
-const tactus_experiment *made(Store &store, const std::vector<std::string> &names, const std::string &command,
-							  const std::string &text, double evidence)
+const tactus_experiment *made(Store &store, const char *device, const std::vector<std::string> &names,
+							  const std::string &command, const std::string &text, double evidence)
 {
 	std::vector<const char *> list;
 	list.reserve(names.size());
@@ -241,7 +241,8 @@ const tactus_experiment *made(Store &store, const std::vector<std::string> &name
 	e.separates_count = list.size();
 	e.separates = store.keep(std::move(list));
 	e.command = store.text(command);
-	e.text = store.text(text);
+	e.text =
+		store.text(device ? text : text + " (with your own device in place of the simulated one: `tactus devices`)");
 	e.expected_delta_bic = evidence;
 	return store.keep(std::vector<tactus_experiment>{e});
 }
@@ -301,7 +302,7 @@ const tactus_experiment *to_test_more(Store &store, const Work &work, const char
 	std::string text = "this recording could not test ";
 	for (size_t i = 0; i < names.size(); i++)
 		text += (i ? ", " : "") + names[i];
-	return made(store, names, command_of(work, device, choice.steps, choice.rate_Hz),
+	return made(store, device, names, command_of(work, device, choice.steps, choice.rate_Hz),
 				text + "; this one can: " + choice.item->what, NAN);
 }
 
@@ -330,20 +331,20 @@ const tactus_experiment *propose(Store &store, const Work &work, const char *dev
 			char expected[96];
 			snprintf(expected, sizeof expected, "; expected evidence between %s and %s: ΔBIC −%.0f", names[0].c_str(),
 					 first->name.c_str(), choice.evidence);
-			return made(store, names, command_of(work, device, choice.steps, choice.rate_Hz),
+			return made(store, device, names, command_of(work, device, choice.steps, choice.rate_Hz),
 						words_of(*choice.item, names[0], first->name) + expected, choice.evidence);
 		}
 	}
 	if (first)
-		return made(store, names, by_covariate(work, device, first->effect), text_of(first->effect) + by_hand(work),
-					NAN);
+		return made(store, device, names, by_covariate(work, device, first->effect),
+					text_of(first->effect) + by_hand(work), NAN);
 	const std::string apart = effect && effect->twin_separated_by ? effect->twin_separated_by
 							  : d.moved.separated_by              ? d.moved.separated_by
 																  : "another experiment";
 	std::string command = by_covariate(work, device, effect);
 	if (work.problem->domain->loaded)
 		command = scan_command(work, device, "--loads standard --mode dc,ac");
-	return made(store, names, command, "what tells them apart: " + apart, NAN);
+	return made(store, device, names, command, "what tells them apart: " + apart, NAN);
 }
 
 } // namespace tactus::explain

@@ -311,6 +311,9 @@ survives() {
 	[[ $(next) == "tactus scan usb:09db:00a9:0123 "* ]]
 	sed -i 's/^# device: .*/# device: ACME logger, serial 7/' once.csv
 	[[ $(next) == "tactus scan sim: "* ]]
+	tactus diagnose once.csv --json | jq -e '.series[0].next_experiment.text | test("your own device in place of the simulated one")'
+	tactus diagnose once.csv --device usb:09db:00a9 --json |
+		jq -e '.series[0].next_experiment.text | test("your own device") | not'
 }
 
 @test "a load that is no force is moved by hand: the proposed experiment speaks of its unit, not of newtons" {
