@@ -535,8 +535,9 @@ void Decider::adequacy()
 		if (std::none_of(d.left.begin(), d.left.end(),
 						 [&](const Dependence &f) { return f.group->covariate == dep.group->covariate; }))
 			d.left.push_back(dep);
-	std::stable_sort(d.left.begin(), d.left.end(),
-					 [](const Dependence &a, const Dependence &b) { return a.explained > b.explained; });
+	if (!beside.empty())
+		std::stable_sort(d.left.begin(), d.left.end(),
+						 [](const Dependence &a, const Dependence &b) { return a.explained > b.explained; });
 	d.bursts = find_bursts(problem, d.final, evidence.groups);
 	d.swing = find_swing(problem, d.final.hypothesis, evidence.groups);
 	/* Steps without end are something that changes from stretch to stretch and was not recorded. */

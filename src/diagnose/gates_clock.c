@@ -273,7 +273,7 @@ static int say_lost(const tactus_table *recording, const scan *scans, size_t cou
 	char place[TACTUS_GATE_TEXT];
 	return tactus_gate_add(problems, "lost-scans", 0, false, listed, places,
 						   "sequence skips %.0f scan%s (%.2g %%) in %zu place%s, first before %s: lost on the way; "
-						   " scan slower if effects of seconds matter",
+						   "scan slower if effects of seconds matter",
 						   lost, lost == 1 ? "" : "s", 100 * lost / (lost + (double)count), places,
 						   places == 1 ? "" : "s",
 						   tactus_gate_row(recording, listed[0], time ? time[listed[0]] : NAN, place));

@@ -83,6 +83,7 @@ const tactus_dependence *describe(Store &store, const Work &work, const std::vec
 const char *swing_in_words(Store &store, const Work &work, const Swing &swing);
 const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, std::vector<double> *per_cause,
 								std::vector<double> *per_cause_low, std::vector<double> *per_cause_high);
+/* device: NULL where it is not known whose recording this is. */
 const tactus_experiment *propose(Store &store, const Work &work, const char *device);
 /* The channel's parameters in a model that holds every effect of `effects` in that order. */
 void extend(const Work &work, const std::vector<const tactus_effect *> &effects, tactus_model *model);
