@@ -57,7 +57,7 @@ def modbus(table):
     port = port.value
     merged, apart = profile("merged", 2, 0), profile("apart", 4, 0)
     one, eight = [(0, 2 * REGISTERS)], [(4 * i, 2) for i in range(REGISTERS)]
-    best = race(3, bare_one=lambda: bare(port, one), scan_one=lambda: cpu_seconds(scan(port, merged)),
+    best = race(9, bare_one=lambda: bare(port, one), scan_one=lambda: cpu_seconds(scan(port, merged)),
                 bare_eight=lambda: bare(port, eight), scan_eight=lambda: cpu_seconds(scan(port, apart)))
     for name, ours, peer, requests in (("merged, 1 request a scan", best["scan_one"], best["bare_one"], 1),
                                        ("one by one, 8 requests a scan", best["scan_eight"], best["bare_eight"], 8)):
