@@ -204,14 +204,28 @@ static void count_scans(struct scan *scan, const tactus_reading *readings, size_
 	}
 }
 
+/* No clock tells more than nanoseconds, and after some weeks a double holds microseconds: what sums add is rounding. */
+static double as_clocked_s(double time_s)
+{
+	const double ticks_per_s = fabs(time_s) < 4e6 ? 1e9 : 1e6;
+	return round(time_s * ticks_per_s) / ticks_per_s;
+}
+
+/* After what was there; what a recording plays back as it is keeps its digits. */
+static void put_on_clock(const struct scan *scan, tactus_reading *readings, size_t n)
+{
+	const bool shifted = scan->after_scans > 0, summed = shifted || tactus_device_is_live(scan->device);
+	for (size_t i = 0; i < n && summed; i++) {
+		readings[i].time_s = as_clocked_s(readings[i].time_s + (shifted ? scan->after_s : 0));
+		readings[i].sequence += scan->after_scans;
+	}
+}
+
 /* Readings become records, and are written and flushed; `first_second`: of these the tare is taken. */
 static int put(struct scan *scan, tactus_reading *readings, size_t n, bool first_second)
 {
 	count_scans(scan, readings, n);
-	for (size_t i = 0; i < n && scan->after_scans; i++) {
-		readings[i].time_s += scan->after_s;
-		readings[i].sequence += scan->after_scans;
-	}
+	put_on_clock(scan, readings, n);
 	int error = tactus_device_table(scan->device, readings, n, scan->raw, scan->table);
 	if (!error && scan->converter)
 		error = tactus_converter_block(scan->converter, scan->table);

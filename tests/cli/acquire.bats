@@ -117,6 +117,14 @@ columns() { grep -v '^#' | head -1; }
 	[ "$(tactus show run.csv --json | jq -c '[.clock.gaps, .clock.backward, .scans.lost]')" = "[0,0,0]" ]
 }
 
+@test "scan --append: times have the clock's digits, none that come of adding" {
+	for bench in sim: sim:lebosse; do
+		tactus scan $bench --channels 1 --count 300 -o run.csv --overwrite
+		tactus scan $bench --channels 1 --count 300 -o run.csv --append
+		[ "$(column time_s <run.csv | grep -cE '[.][0-9]{10}')" -eq 0 ] || fail "$bench: $(column time_s <run.csv | grep -E '[.][0-9]{10}' | head -3)"
+	done
+}
+
 @test "scan replay:FILE plays a recording" {
 	tactus scan sim: --count 4 -o run.csv
 	tactus scan replay:run.csv >played.csv

@@ -76,6 +76,9 @@ alike() {
 	[ "$(metadata acquisition <stream.csv)" = stream ]
 	# by the device's timer: no jitter at all
 	[ "$(column time_s <stream.csv | head -3 | tr '\n' ' ')" = "0.015625 0.03125 0.046875 " ]
+	# where its period is no round number, to the nanosecond
+	tactus scan "$uri&stream=1" --raw --rate 3 --count 1 >thirds.csv
+	[ "$(column time_s <thirds.csv | grep -cE '[.][0-9]{10}')" -eq 0 ]
 }
 
 @test "labjack: a T4 has other lines, and its flexible ones become digital first" {
