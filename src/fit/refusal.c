@@ -1,9 +1,15 @@
 /* What the data cannot support: too few points, a force that never varies, a dead channel, an untestable effect. */
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/core.h"
 #include "fit/fit_work.h"
+
+#define SAME 1e-9    /* a span that is this share of the mean is rounding */
+#define HELD 0.01    /* that is this share of it is a load that was held */
+#define NOISE_SKEW 4 /* noise about zero reaches no more than so many times as far up as down */
 
 tactus_moments tactus_moments_of(const double *x, const bool *use, size_t n)
 {
@@ -67,49 +73,108 @@ static double follows(const double *x, const double *y, const bool *use, size_t 
 	return fabs(r) * sqrt((double)(count - 2) / fmax(1 - r * r, 1e-300));
 }
 
+/*
+ * Half the mean square of successive differences over the variance: 1 for white noise, far less for a load that is seen
+ * to come and go (von Neumann 1941); of n values of white noise it has a standard deviation of 1/√n.
+ */
+static double whiteness(const double *x, size_t n, double square)
+{
+	double squares = 0;
+	for (size_t i = 1; i < n; i++)
+		squares += isfinite(x[i]) && isfinite(x[i - 1]) ? (x[i] - x[i - 1]) * (x[i] - x[i - 1]) : 0;
+	return squares / 2 / square;
+}
+
+/* A load that stays where it is but for the reference's noise: about zero, where noise goes below it, or elsewhere. */
+static bool idle(const tactus_points *points, const tactus_moments *force)
+{
+	const double span = force->high - force->low;
+	if (!(span > HELD * fabs(force->mean)))
+		return true;
+	return force->low < 0 && force->high < -NOISE_SKEW * force->low &&
+		   whiteness(points->input, points->n, force->square) > fmin(0.3, 1 - 3 / sqrt((double)force->n));
+}
+
+/* Why the load says nothing, whatever the readings are; NULL if it varies. */
+static char *force_problem(const tactus_series *series, const tactus_points *points)
+{
+	char low[TACTUS_NUMBER_SIZE], high[TACTUS_NUMBER_SIZE];
+	bool *all = malloc((points->n ? points->n : 1) * sizeof *all);
+	for (size_t p = 0; all && p < points->n; p++)
+		all[p] = isfinite(points->input[p]);
+	const tactus_moments force = all ? tactus_moments_of(points->input, all, points->n) : (tactus_moments){0};
+	free(all);
+	if (!force.n || !idle(points, &force))
+		return NULL;
+	tactus_format_number(force.low, low);
+	snprintf(high, sizeof high, "%.4g", force.high);
+	if (!(force.high - force.low > SAME * fabs(force.mean)))
+		return tactus_asprintf("%s never varies: it is %s in all %zu points; apply loads over the sensor's range",
+							   series->input_name, low, force.n);
+	snprintf(low, sizeof low, "%.4g", force.low);
+	return tactus_asprintf("%s never varies by more than noise: it is %s to %s in all %zu points; apply loads over the "
+						   "sensor's range",
+						   series->input_name, low, high, force.n);
+}
+
 static char *reading_problem(const tactus_series *series, const tactus_points *points, const bool *use, size_t o)
 {
 	char low[TACTUS_NUMBER_SIZE];
 	const char *name = tactus_output_label(series, o);
-	if (!series->output_name[o] || !series->output_name[o][0])
-		return tactus_asprintf("the recording has no %s", name);
 	tactus_moments m = tactus_moments_of(points->reading[o], use, points->n);
 	tactus_format_number(m.low, low);
 	if (m.n == 0)
 		return tactus_asprintf("no usable %s (%zu readings are clipped, wrong-signed or missing)", name,
 							   points->left_out);
 	if (m.low == m.high)
-		return tactus_asprintf("%s is %s in all %zu readings: the channel is %s", name, low, m.n,
-							   m.low == 0 ? "open" : "dead");
+		return tactus_asprintf("%s is %s in all %zu readings: the channel is %s; look at its wiring, or leave it out",
+							   name, low, m.n, m.low == 0 ? "open" : "dead");
 	if (series->domain == &tactus_domain_sensor && follows(points->input, points->reading[o], use, points->n) < 3)
-		return tactus_asprintf("%s does not follow the force: the channel is dead or open", name);
+		return tactus_asprintf(
+			"%s does not follow the force: the channel is dead or open; look at its wiring, or leave "
+			"it out",
+			name);
 	return NULL;
+}
+
+static char *too_few(const tactus_points *points, size_t n, size_t needed)
+{
+	char left_out[96] = "";
+	if (points->left_out)
+		snprintf(left_out, sizeof left_out, " (%zu readings were left out: clipped, wrong-signed or missing)",
+				 points->left_out);
+	return tactus_asprintf("%zu points are too few: %zu parameters need at least %zu%s; record more", n, needed / 2,
+						   needed, left_out);
+}
+
+/* What points and readings lack; a load that never varies would make any of it seem so, and is what is said then. */
+static char *data_problem(const tactus_plan *plan, const tactus_series *series, const tactus_points *points,
+						  const bool *use)
+{
+	const size_t needed = 2 * parameter_count(series->domain, plan);
+	const bool sensor = series->domain == &tactus_domain_sensor;
+	const tactus_moments force = tactus_moments_of(points->input, use, points->n);
+	char *problem = force.n < needed ? too_few(points, force.n, needed) : NULL;
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX && !problem; o++)
+		problem = plan->outputs[o] ? reading_problem(series, points, use, o) : NULL;
+	const bool constant = force.n >= needed && !(force.high - force.low > SAME * fabs(force.mean));
+	char *unloaded = sensor && points->n >= needed && (problem || constant) ? force_problem(series, points) : NULL;
+	if (!unloaded)
+		return problem;
+	free(problem);
+	return unloaded;
 }
 
 /* Why a channel cannot be fitted; NULL if it can. */
 char *tactus_plan_problem(const tactus_plan *plan, const tactus_series *series, const tactus_points *points,
 						  const bool *use)
 {
-	size_t n = 0, needed = 2 * parameter_count(series->domain, plan);
-	for (size_t p = 0; p < points->n; p++)
-		n += use[p];
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++)
 		if (plan->outputs[o] && (!series->output_name[o] || !series->output_name[o][0]))
-			return reading_problem(series, points, use, o);
-	if (n < needed)
-		return tactus_asprintf("%zu points are too few: %zu parameters need at least %zu (%zu readings were left out: "
-							   "clipped, wrong-signed or missing)",
-							   n, needed / 2, needed, points->left_out);
-	tactus_moments force = tactus_moments_of(points->input, use, points->n);
-	char text[TACTUS_NUMBER_SIZE];
-	tactus_format_number(force.mean, text);
-	if (series->domain == &tactus_domain_sensor && !(force.high - force.low > 1e-9 * fabs(force.mean)))
-		return tactus_asprintf("%s never varies: it is %s in all %zu points", series->input_name, text, n);
-	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
-		char *problem = plan->outputs[o] ? reading_problem(series, points, use, o) : NULL;
-		if (problem)
-			return problem;
-	}
+			return tactus_asprintf("the recording has no %s", tactus_output_label(series, o));
+	char *problem = data_problem(plan, series, points, use);
+	if (problem)
+		return problem;
 	for (size_t k = 0; k < plan->effect_count; k++) {
 		const char *why = plan->effects[k]->testable(series);
 		if (why)

@@ -252,6 +252,29 @@ columns() { grep -v '^#' | head -1; }
 	status_is 1
 }
 
+@test "fit: a scan at rest is told from a dead channel, and both from too few points" {
+	for bench in sim: sim:lebosse; do
+		tactus scan $bench -q --count 10 --protocol 'rest 10s' -o rest.csv --overwrite
+		run --separate-stderr tactus fit rest.csv -o m.toml
+		status_is 1
+		says "force_N never varies by more than noise: it is -0."
+		says "apply loads over the sensor's range"
+	done
+	# half of the readings below zero are left out: it is the load all the same
+	recording 10 | awk -F, -v OFS=, 'NR > 1 { $4 = 0; $5 = (NR % 3 - 1) * 1e-9 } { print }' >zero.csv
+	run --separate-stderr tactus fit zero.csv -o m.toml
+	status_is 1
+	says "force_N never varies: it is 0 in all 10 points"
+	recording | awk -F, -v OFS=, 'NR > 1 { $5 = 1e-6 } { print }' >dead.csv
+	run --separate-stderr tactus fit dead.csv -o m.toml
+	status_is 1
+	says "conductance_S is 1e-06 in all 40 readings: the channel is dead; look at its wiring"
+	recording 3 >few.csv
+	run --separate-stderr tactus fit few.csv -o m.toml
+	status_is 1
+	says "3 points are too few: 2 parameters need at least 4; record more"
+}
+
 @test "fit --model forward: a column that a scan in dc leaves empty is no output, unless it is asked for" {
 	tactus scan sim:lebosse --count 1000 -q -o dc.csv
 	tactus fit dc.csv --model forward -q -o forward.toml >forward
