@@ -160,7 +160,7 @@ static void causes(const struct html *html, const tactus_diagnosed *series, size
 		html_element(html, "h3", title);
 		html_element(html, "p", cause->summary);
 		if (cause->source && *cause->source) {
-			fputs("<p class=\"soft\">Equation: ", html->out);
+			fputs("<p class=\"soft\">Source: ", html->out);
 			html_text(html, cause->source);
 			fputs("</p>\n", html->out);
 		}

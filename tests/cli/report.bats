@@ -56,7 +56,8 @@ measure() {
 					return a.left < b.left - 1 || a.right > b.right + 1 || a.top < b.top - 1 || a.bottom > b.bottom + 1;
 				}).map(t => t.textContent);
 				const text = s.querySelector("text");
-				return {label: s.getAttribute("aria-label"), box: box(s), drawn: s.getBBox().width, outside,
+				const texts = [...s.querySelectorAll("text")].map(t => t.textContent.trim().replace(/\s+/g, " "));
+				return {label: s.getAttribute("aria-label"), texts, box: box(s), drawn: s.getBBox().width, outside,
 					marks: [...s.querySelectorAll("path")].reduce((n, p) => n + p.getAttribute("d").length, 0),
 					bars: s.querySelectorAll("polygon").length,
 					letters: text ? text.getBoundingClientRect().height : 0};
@@ -136,6 +137,12 @@ measure() {
 			assert m["verdict"] == result["verdict"]
 		EOP
 	done
+}
+
+@test "a cause names its source as such" {
+	type gnuplot >/dev/null 2>&1 || skip "no gnuplot"
+	source=$(jq -r '.series[0].causes[0].source' "$BATS_FILE_TMPDIR/one.json")
+	grep -qF "Source: $source" "$BATS_FILE_TMPDIR/one/index.html"
 }
 
 @test "no network, no script: nothing is requested, and nothing could be" {
