@@ -145,6 +145,29 @@ measure() {
 	grep -qF "Source: $source" "$BATS_FILE_TMPDIR/one/index.html"
 }
 
+@test "every candidate of the evidence has its label and value in the picture, as the JSON has them" {
+	needs_browser
+	measure one 1280
+	"$PYTHON" - "$BATS_FILE_TMPDIR/one.json" <<-'EOP'
+		import json, sys
+		series = json.load(open(sys.argv[1]))["series"][0]
+		texts, = [p["texts"] for p in json.load(open("measured.json"))["pictures"] if p["label"].startswith("Evidence")]
+		assert len(series["candidates"]) > 10
+		for candidate in series["candidates"]:
+		    assert texts.count(candidate["effect"]) == 1, (candidate, texts)
+		    shown = texts[texts.index(candidate["effect"]) + 1]
+		    if candidate["why"]:
+		        assert shown == "not testable", (candidate, shown)
+		    elif candidate["delta_bic"] is None:
+		        assert shown == "not tried", (candidate, shown)
+		    else:
+		        evidence = -candidate["delta_bic"]
+		        assert abs(float(shown.replace("−", "-")) - evidence) <= (0.0501 if abs(evidence) < 10 else 0.501), (candidate, shown)
+		for cause in series["causes"]:
+		    assert cause["effect"] in texts, cause["effect"]
+	EOP
+}
+
 @test "no network, no script: nothing is requested, and nothing could be" {
 	needs_browser
 	measure one 800
