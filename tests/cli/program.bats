@@ -210,3 +210,15 @@ complete_words() {
 	NO_COLOR= TERM=xterm script -qec "tactus scna" /dev/null >on || true
 	grep -q $'\033' on
 }
+
+@test "every public function is in the list of changes, by its name or its family's" {
+	"$PYTHON" - "$root" <<-'EOP'
+		import fnmatch, pathlib, re, sys
+		root = pathlib.Path(sys.argv[1])
+		families = re.findall(r"`(tactus_\w+\*?)`", (root / "CHANGELOG.md").read_text())
+		for header in sorted((root / "include/tactus").glob("*.h")):
+		    for name in re.findall(r"TACTUS_API[^;]*?\b(tactus_\w+)\(", header.read_text()):
+		        of_three = "tactus_fit", "tactus_join", "tactus_diagnos", "tactus_verdict"
+		        assert name.startswith(of_three) or any(fnmatch.fnmatchcase(name, f) for f in families), name
+	EOP
+}
