@@ -8,7 +8,9 @@ static void report(const struct cli *cli, const tactus_join_options *options, co
 				   size_t rows)
 {
 	if (isnan(options->offset_s))
-		cli_note(cli, "offset %.6g s ± %.2g s, to be added to the reference's time (correlation %.4f)",
+		cli_note(cli,
+				 "offset between the clocks %.6g s ± %.2g s (the sensor's own lag included), to be added to the "
+				 "reference's time (correlation %.4f)",
 				 result->offset_s, result->offset_std_s, result->correlation);
 	if (options->drift)
 		cli_note(cli, "the reference's clock gains %.3g ± %.2g s per second of the scan", result->drift,
@@ -98,8 +100,10 @@ const struct cli_command cli_join = {
 		"do not overlap and in gaps of the reference. Their clocks need not agree: the offset between them is "
 		"estimated "
 		"as the one at which the readings follow the force best, and reported with its standard error on standard "
-		"error and in the metadata (reference_offset_s, reference_offset_std_s). A sensor that creeps or lags shows "
-		"up as a part of the offset.\n\n"
+		"error and in the metadata (reference_offset_s, reference_offset_std_s). The "
+		"sensor's own delay is part of it: a film that lags or creeps looks just like a clock that is late, and these "
+		"two streams cannot tell them apart, so the standard error is of the sum. Where the clocks agree by design, "
+		"state it: --offset 0s.\n\n"
 		"A load that repeats itself fits at several offsets, which is then said; --max-offset or --offset decides. "
 		"--delimiter, --decimal-comma and --columns are about REFERENCE; the three that begin with --scan- do the same "
 		"for "

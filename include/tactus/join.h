@@ -39,7 +39,9 @@ TACTUS_API tactus_join_options tactus_join_defaults(void);
  * the overlap and in gaps of the reference. The offset is the one at which the readings, channel by channel and mode
  * by mode, are best explained as a straight line over the force: first all lags of a common grid by normalised
  * cross-correlation, then Gauss-Newton on the rows themselves. The standard error allows for residuals that hang
- * together. The offset is written to the scan's metadata (`reference_offset_s`, `reference_offset_std_s`,
+ * together. A delay of the sensor's own (lag, creep) is part of the offset: two streams cannot tell it from the
+ * clocks'. Where most of the noise is the reference's, which interpolation smooths unevenly, the standard error may be
+ * a third too small. The offset is written to the scan's metadata (`reference_offset_s`, `reference_offset_std_s`,
  * `reference_drift`). options may be NULL. TACTUS_ERR_INPUT if a column is missing or a clock goes back;
  * TACTUS_ERR_DATA if the force never changes, no reading follows it, or there is no overlap.
  */
