@@ -233,6 +233,64 @@ void Diagnosis::explain(Work &work)
 			problem.noise.spread[o] = d.swing.floor[o];
 }
 
+namespace
+{
+
+constexpr size_t HEADLINE = 155; /* bytes: two lines of a terminal */
+
+using Shared = std::vector<std::pair<std::string, std::vector<int>>>; /* what is said, and of which channels */
+
+void add_channel(Shared &said, const std::string &what, int channel)
+{
+	auto same = std::find_if(said.begin(), said.end(), [&](const auto &p) { return p.first == what; });
+	if (same == said.end())
+		said.push_back({what, {channel}});
+	else
+		same->second.push_back(channel);
+}
+
+/* The causes of a channel, or its verdict where it has none; in short, a crowd of rivals is counted. */
+std::vector<std::string> causes_in_words(const tactus_diagnosed &s, bool in_short)
+{
+	std::vector<std::string> words;
+	for (size_t i = 0; i < s.cause_count; i++) {
+		const tactus_cause &cause = s.causes[i];
+		std::string what = cause.effect;
+		if (in_short && cause.inseparable > 1)
+			what += " or " + std::to_string(cause.inseparable) + " others";
+		else
+			for (size_t k = 0; k < cause.inseparable; k++)
+				what += " or " + std::string(cause.rivals[k].effect);
+		words.push_back(what);
+	}
+	if (words.empty())
+		words.push_back(tactus_verdict_name(s.verdict));
+	return words;
+}
+
+/* What most channels share comes first; what is past the length of a headline stands with the channels. */
+std::string shared_in_words(Shared said, size_t n, bool cut)
+{
+	static const char more[] = "; and more";
+	std::stable_sort(said.begin(), said.end(),
+					 [](const auto &a, const auto &b) { return a.second.size() > b.second.size(); });
+	std::string text;
+	for (const auto &[what, channels] : said) {
+		std::string part = text.empty() ? "" : "; ";
+		if (channels.size() > 1)
+			part += std::to_string(channels.size()) + " of " + std::to_string(n) +
+					(cut && !text.empty() ? ": " : " sensors: ") + what;
+		else
+			part += "sensor " + std::to_string(channels[0]) + ": " + what;
+		if (cut && !text.empty() && text.size() + part.size() + sizeof more > HEADLINE)
+			return text + more;
+		text += part;
+	}
+	return text;
+}
+
+} // namespace
+
 /* The gravest verdict of the series is that of the whole; nothing is wrong only where every series could be judged. */
 void Diagnosis::summarise()
 {
@@ -252,34 +310,17 @@ void Diagnosis::summarise()
 		d.summary = store->series[0].summary;
 		return;
 	}
-	std::vector<std::pair<std::string, std::vector<int>>> said;
+	Shared whole, parts;
 	for (const tactus_diagnosed &s : store->series) {
-		std::string what = tactus_verdict_name(s.verdict);
-		if (s.cause_count) {
-			what.clear();
-			for (size_t i = 0; i < s.cause_count; i++) {
-				what += (i ? " and " : "") + std::string(s.causes[i].effect);
-				for (size_t k = 0; k < s.causes[i].inseparable; k++)
-					what += " or " + std::string(s.causes[i].rivals[k].effect);
-			}
-		}
-		auto same = std::find_if(said.begin(), said.end(), [&](const auto &p) { return p.first == what; });
-		if (same == said.end())
-			said.push_back({what, {s.channel}});
-		else
-			same->second.push_back(s.channel);
+		std::string what;
+		for (const std::string &cause : causes_in_words(s, false))
+			what += (what.empty() ? "" : " and ") + cause;
+		add_channel(whole, what, s.channel);
+		for (const std::string &cause : causes_in_words(s, true))
+			add_channel(parts, cause, s.channel);
 	}
-	std::stable_sort(said.begin(), said.end(),
-					 [](const auto &a, const auto &b) { return a.second.size() > b.second.size(); });
-	std::string text;
-	for (const auto &[what, channels] : said) {
-		text += text.empty() ? "" : "; ";
-		if (channels.size() > 1 || n == 1)
-			text += std::to_string(channels.size()) + " of " + std::to_string(n) + " sensors: " + what;
-		else
-			text += "sensor " + std::to_string(channels[0]) + ": " + what;
-	}
-	d.summary = store->text(text);
+	const std::string text = shared_in_words(whole, n, false);
+	d.summary = store->text(text.size() <= HEADLINE ? text : shared_in_words(parts, n, true));
 }
 
 /* Every effect that some channel has, in the order of the chains. */

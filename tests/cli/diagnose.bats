@@ -171,6 +171,44 @@ survives() {
 	tactus diagnose "$three" --json | jq -e '[.series[].channel] == [1, 2, 3]'
 }
 
+@test "eight channels with causes of their own: the headline is two lines, what is shared comes first" {
+	cat >mixed.toml <<-'EOB'
+		kind = "bench"
+		base = "paredes"
+		protocol = "rest 5s, hold 150N 30s, rest 20s, hold 90N 30s, rest 20s, staircase 0N..180N 30N 2s, rest 10s"
+		[[effect]]
+		name = "creep"
+		amplitude_1 = 0.03
+		amplitude_10 = 0.06
+		channels = [1, 2, 4, 5, 7, 8]
+		[[effect]]
+		name = "step-change"
+		time_1_s = 60
+		conductance_offset_1_S = 5e-6
+		channels = [3, 5]
+		[[effect]]
+		name = "hysteresis"
+		play_weight_4 = 0.2
+		channels = [2, 6]
+		[[effect]]
+		name = "drift"
+		conductance_gain = 0.3
+		reference_time_s = 100
+		channels = [4, 7]
+		[[effect]]
+		name = "nonlinearity"
+		exponent = 0.8
+		channels = [8, 1]
+	EOB
+	tactus scan sim:mixed.toml -q -o mixed.csv
+	run --separate-stderr tactus diagnose mixed.csv
+	status_is 0
+	# from the headline to the line below it
+	sed -n '/^6 of 8 sensors: creep; /,/^Measured/p' <<<"$output" >top
+	[ "$(wc -l <top)" -ge 2 ] && [ "$(wc -l <top)" -le 3 ] || fail "no headline of two lines at most"
+	for c in 1 2 3 4 5 6 7 8; do grep -q "^      $c  " <<<"$output" || fail "channel $c"; done
+}
+
 @test "several recordings are one experiment" {
 	tactus scan sim:"$BATS_FILE_TMPDIR/creep.toml" --protocol "rest 5s, hold 100N 30s, rest 20s" --channels 1 --mode dc -q -o more.csv
 	tactus diagnose "$creep" more.csv --json >result.json
