@@ -15,12 +15,16 @@ namespace tactus::explain
 namespace
 {
 
-/* Mean over standard error of what an output in each training block says for b, in squares or in their logarithm. */
+/*
+ * Mean over standard error of what an output in each training block says for b, in squares or in their logarithm, as a
+ * normal score (Wallace's approximation of Student's t). A block in which a and b foretell the same says nothing: a
+ * few clipped readings stand in few of them.
+ */
 double paired_in(const Problem &problem, const std::vector<double> &a, const std::vector<double> &b, bool logarithm)
 {
 	double sum = 0, square = 0, n = 0;
 	for (size_t k = 0; k < a.size(); k++) {
-		if (problem.test[k / problem.output_count] || (a[k] == 0 && b[k] == 0))
+		if (problem.test[k / problem.output_count] || !(std::abs(a[k] - b[k]) > limits.same))
 			continue;
 		const double d = logarithm ? std::log((a[k] + 1) / (b[k] + 1)) : a[k] - b[k];
 		sum += d;
@@ -30,7 +34,10 @@ double paired_in(const Problem &problem, const std::vector<double> &a, const std
 	if (n < 3)
 		return 0;
 	const double mean = sum / n, variance = (square / n - mean * mean) * n / (n - 1);
-	return variance > 0 ? mean / std::sqrt(variance / n) : sum > 0 ? INFINITY : 0;
+	if (!(variance > 0))
+		return sum > 0 ? INFINITY : 0;
+	const double freedom = n - 1, t = mean / std::sqrt(variance / n);
+	return std::copysign(std::sqrt(freedom * std::log1p(t * t / freedom)) * (8 * freedom + 1) / (8 * freedom + 3), t);
 }
 
 } // namespace
@@ -81,11 +88,40 @@ bool drop_idle(Hypothesis &h, const tactus_effect *effect, bool &changed)
 
 } // namespace
 
-Fit join(const Problem &problem, const Fit &fit, const Part &part)
+namespace
+{
+
+/* The part fitted beside the rest, in the best of the forms that it states: seen linearly, the wrong one may lead. */
+Fit fit_forms(const Problem &problem, const Fit &fit, const Part &part)
 {
 	Hypothesis h = fit.hypothesis;
 	h.add(problem.domain, part);
 	Fit best = problem.fit(h, Rows::train);
+	const tactus_effect *effect = part.effect;
+	for (size_t i = 0; i < effect->search_count && best.ok; i++) {
+		const tactus_search &search = effect->searches[i];
+		if (search.kind != TACTUS_SEARCH_VALUES || effect->parameters[search.parameter].kind != TACTUS_CONSTANT)
+			continue;
+		for (int k = 0; k < search.count; k++) {
+			Part other = part;
+			other.value[search.parameter] = search.values[k];
+			if (other.value[search.parameter] == part.value[search.parameter])
+				continue;
+			Hypothesis moved = fit.hypothesis;
+			moved.add(problem.domain, other);
+			Fit with = problem.fit(moved, Rows::train);
+			if (with.ok && with.cost < best.cost)
+				best = std::move(with);
+		}
+	}
+	return best;
+}
+
+} // namespace
+
+Fit join(const Problem &problem, const Fit &fit, const Part &part)
+{
+	Fit best = fit_forms(problem, fit, part);
 	for (int round = 0; round < 6 && best.ok; round++) {
 		bool changed = false;
 		Hypothesis next = best.hypothesis;

@@ -23,6 +23,7 @@ struct Limits {
 	double margin = 10;                 /* over the runner-up, in Schwarz's criterion */
 	double parameter_share = 0.03;      /* of what an effect explains that each of its parameters must bring */
 	double paired = 2;                  /* standard errors, of paired held-out gains */
+	double same = 0.01;                 /* of a reading's noise squared, within which two foretell a block alike */
 	double structure_p = 1e-6;          /* of a dependence that is left, times the number looked at */
 	double structure = 0.02;            /* held-out share of the whitened squares that it must explain */
 	double half = 0.5;                  /* of what could be explained, that causes must explain to be named */
