@@ -8,6 +8,7 @@
 
 #include "diagnose/dependence.hpp"
 #include "diagnose/limits.hpp"
+#include "diagnose/wander.hpp"
 
 namespace tactus::explain
 {
@@ -527,8 +528,8 @@ bool Decider::needless(const Group &group) const
 
 /*
  * Share of what is left that a cause with jumps explains, if it is none: something that wanders is approached by jumps,
- * but they neither explain nearly all of it nor foretell blocks that the fit has not seen as those of a true one do.
- * Beside another cause they may have to share.
+ * but they neither leave nothing to a walk nor foretell blocks that the fit has not seen. Beside another cause they may
+ * have to share.
  */
 double Decider::wandering(const Cause &cause) const
 {
@@ -538,7 +539,7 @@ double Decider::wandering(const Cause &cause) const
 	const double share = 1 - rest(d.final.hypothesis) / rest(cause.without.hypothesis);
 	const bool foretold =
 		paired(problem, problem.held_out(cause.without), problem.held_out(d.final)) > limits.jump_foretold;
-	return share < limits.jump_whole && !foretold ? std::fmax(share, 1e-3) : 0;
+	return foretold || leaps(problem, cause.without, d.final, cause.effect) ? 0 : std::fmax(share, 1e-3);
 }
 
 /* More than noise without a column that shows what: the noise was judged beside more functions than are mapped. */

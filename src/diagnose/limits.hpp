@@ -29,13 +29,13 @@ struct Limits {
 	double half = 0.5;                  /* of what could be explained, that causes must explain to be named */
 	double hopeless = 0.4;              /* of the best evidence, below which a candidate is not fitted */
 	double far = 0.85;                  /* of a cause's evidence, below which a rival need not lose block by block */
-	double jump_whole = 0.9, jump_foretold = 5; /* of what is left that a jump explains, else `paired` of it: it may be
-												   something that wanders */
-	double stray = 1.4;                         /* times the noise: more is not noise, whatever it is */
-	double tails = 5;                           /* kurtosis of whitened readings above which they may come in bursts */
-	double burst_score = 3.3;                   /* standard errors that they must stand together more than by chance */
-	double burst_gross = 0.6;                /* of the squares in a fiftieth of the readings: no noise has such tails */
-	double burst_least = 0.01;               /* of the mean square, below which all are as small */
+	double jump_all = 0.93;             /* of what jumps and a walk explain together, that jumps must alone … */
+	double jump_foretold = 5;           /* … or else `paired` of them: it may be something that wanders */
+	double stray = 1.4;                 /* times the noise: more is not noise, whatever it is */
+	double tails = 5;                   /* kurtosis of whitened readings above which they may come in bursts */
+	double burst_score = 3.3;           /* standard errors that they must stand together more than by chance */
+	double burst_gross = 0.6;           /* of the squares in a fiftieth of the readings: no noise has such tails */
+	double burst_least = 0.01;          /* of the mean square, below which all are as small */
 	long burst_after = 2, burst_before = 10; /* rows after a large one, and before it, that are looked at */
 	size_t burst_rows = 100;                 /* that a recording must have */
 	/* Swings in what is left, by its spectrum: */
