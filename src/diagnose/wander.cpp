@@ -151,8 +151,7 @@ bool leaps(const Problem &problem, const Fit &without, const Fit &with, const ta
 		jumps += best[2];
 		both += best[3];
 	}
-	const double dear = (with.parameters - without.parameters) * std::log(double(problem.training));
-	return walk - both > limits.evidence + dear && nothing - jumps > limits.jump_all * (nothing - both);
+	return walk - jumps > limits.evidence && nothing - jumps > limits.jump_all * (nothing - both);
 }
 
 } // namespace tactus::explain

@@ -721,10 +721,26 @@ left_over() {
 	jq -e '.verdict == "unexplained" and .series[0].unexplained[0].covariate == "time_s"' said.json
 }
 
-@test "what jumps to and fro for a while and foretells nothing wanders, and is no step-change" {
-	made 'if (i >= 590 && i < 650) g = g * 1.12 + 6e-7; g += 5e-7 * (rand() + rand() + rand() - 1.5)' 1000 >moved.csv
+@test "what jumps to and fro without end and foretells nothing wanders, and is no step-change" {
+	made 'if (rand() < 0.02) w = 2e-6 * (rand() - 0.5); g += w + 5e-7 * (rand() + rand() + rand() - 1.5)' 1000 >moved.csv
 	tactus diagnose moved.csv --json >said.json
 	jq -e '.verdict == "unexplained" and any(.series[0].unexplained[].text; test("wanders that no column records"))' said.json
+}
+
+@test "a small jump late in white noise is one: what it does not explain is noise, and does not wander" {
+	left_over "e = 0.3 * white + 0.3 * (t > 0.85 * t[-1])" >jump.csv
+	tactus diagnose jump.csv --json | jq -e '.series[0].causes | length == 1 and .[0].effect == "step-change"'
+	left_over "e = 0.3 * white + 0.02 * np.cumsum(rng.standard_normal(n))" >walk.csv
+	tactus diagnose walk.csv --json | jq -e '.verdict == "unexplained" and .series[0].causes == []'
+}
+
+@test "readings that stop at the converter's last code: in three stretches of many; by as little as the noise" {
+	for seed in 45023 45037; do
+		PYTHONPATH=$root/tests/blind "$PYTHON" -B -c "import generate
+print(generate.make_case('one/output-clipping', $seed).texts[0], end='')" >last.csv
+		tactus diagnose last.csv --json >said.json
+		jq -e '.verdict == "cause-found" and [.series[0].causes[].effect] == ["output-clipping"]' said.json
+	done
 }
 
 @test "a reference noisier than the sensor makes no cause of its noise: held loads on the bench as it is" {
