@@ -533,7 +533,10 @@ bool Decider::needless(const Group &group) const
  */
 double Decider::wandering(const Cause &cause) const
 {
-	if (!has_instants(cause.effect))
+	/* What explains more, though this recording cannot test it, is a better name than a wanderer. */
+	const bool outdone = std::any_of(cause.rivals.begin(), cause.rivals.end(),
+									 [&](const Rival &r) { return r.inseparable && r.delta < cause.delta; });
+	if (!has_instants(cause.effect) || outdone)
 		return 0;
 	auto rest = [&](const Hypothesis &h) { return problem.left(problem.levelled(h, Rows::train)).squaredNorm(); };
 	const double share = 1 - rest(d.final.hypothesis) / rest(cause.without.hypothesis);
