@@ -74,7 +74,8 @@ enum tactus_effect_flags {
 	TACTUS_EFFECT_RESTAMP = 2,    /* moves the input in time: the inverse leaves it out and moves the record's time */
 	TACTUS_EFFECT_LOOKAHEAD = 4,  /* may look ahead in its block: needs the whole recording in one block */
 	TACTUS_EFFECT_CLOCK = 8,      /* needs seconds: not testable without time_s */
-	TACTUS_EFFECT_ORDER = 16      /* has memory: not testable when the order of the rows is unknown */
+	TACTUS_EFFECT_ORDER = 16,     /* has memory: not testable when the order of the rows is unknown */
+	TACTUS_EFFECT_LOOP = 32       /* opens a loop over the input: at one rate and amplitude as others that do */
 };
 
 /* What a linear look at the neutral value cannot find: a diagnosis tries these values of a parameter first. */

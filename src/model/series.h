@@ -62,6 +62,8 @@ const double *tactus_series_clock(const tactus_series *series);
 /* The input at an instant, on the line between its neighbours; NaN outside the series, which has a clock. */
 double tactus_series_load_at(const tactus_series *series, double time_s);
 size_t tactus_series_reversals(const tactus_series *series, int signal);
+/* The period of a load that goes to and fro without a hold, at one rate and amplitude, two cycles or more; 0: else. */
+double tactus_series_one_period_s(const tactus_series *series);
 
 #ifdef __cplusplus
 }

@@ -318,6 +318,32 @@ static void measures_pass_over_what_is_missing(void **unused)
 	tactus_table_free(table);
 }
 
+/* Triangles up to `second` from the fifth cycle on, held for `hold` of every 40 rows there. */
+static double period_of_triangles(double second, size_t hold, bool faster)
+{
+	tactus_table *table = columns_of(320, "time_s force_N conductance_S");
+	for (size_t i = 0; i < 320; i++) {
+		double place = (double)(i % 40 < hold ? hold : i % 40);
+		values_of(table, "force_N")[i] = (20 - fabs(place - 20)) * (i < 160 ? 1 : second);
+		values_of(table, "time_s")[i] = (double)i * (faster && i >= 160 ? 0.3 : 1) + (faster && i >= 160 ? 112 : 0);
+	}
+	tactus_series *series = only(table, NULL);
+	double period = tactus_series_one_period_s(series);
+	tactus_series_free(series, 1);
+	tactus_table_free(table);
+	return period;
+}
+
+static void a_load_of_one_rate_has_one_amplitude_and_no_holds(void **unused)
+{
+	(void)unused;
+	rig_near(period_of_triangles(1, 0, false), 40, 1e-12);
+	rig_near(period_of_triangles(0.9, 0, false), 40, 1); /* nearly alike */
+	rig_near(period_of_triangles(0.5, 0, false), 0, 0);
+	rig_near(period_of_triangles(1, 18, false), 0, 0);
+	rig_near(period_of_triangles(1, 0, true), 0, 0);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -334,6 +360,7 @@ int main(void)
 		cmocka_unit_test(neighbours_are_found_in_any_order_of_rows),
 		cmocka_unit_test(without_a_clock_neighbours_are_those_of_the_same_scan),
 		cmocka_unit_test(measures_pass_over_what_is_missing),
+		cmocka_unit_test(a_load_of_one_rate_has_one_amplitude_and_no_holds),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

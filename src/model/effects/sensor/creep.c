@@ -72,9 +72,10 @@ const struct tactus_effect tactus_effect_sensor_creep = {
 			  "(1976), generalised Kelvin chain",
 	.covariate = "time_s",
 	.needs = "a load that is held, and its recovery after it",
-	.confused_with = "drift, temperature and the declines on a one-way history: load, rest, load separates them",
+	.confused_with = "drift, temperature and the declines on a one-way history: load, rest, load separates them; "
+					 "hysteresis at one rate and amplitude: two rates and two amplitudes do",
 	.stage = SENSOR_STAGE_INPUT,
-	.flags = TACTUS_EFFECT_CLOCK | TACTUS_EFFECT_ORDER,
+	.flags = TACTUS_EFFECT_CLOCK | TACTUS_EFFECT_ORDER | TACTUS_EFFECT_LOOP,
 	TACTUS_PARAMETERS(parameters),
 	.state_size = STATES,
 	.reset = reset,

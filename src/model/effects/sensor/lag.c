@@ -61,7 +61,7 @@ const struct tactus_effect tactus_effect_sensor_lag = {
 	.confused_with = "time-offset (on one sine exactly the same): a tap sampled at a tenth of the lag separates them; "
 					 "hysteresis on one sine: two rates and two amplitudes do",
 	.stage = SENSOR_STAGE_INPUT,
-	.flags = TACTUS_EFFECT_CLOCK | TACTUS_EFFECT_ORDER,
+	.flags = TACTUS_EFFECT_CLOCK | TACTUS_EFFECT_ORDER | TACTUS_EFFECT_LOOP,
 	TACTUS_PARAMETERS(parameters),
 	.state_size = STATES,
 	.reset = reset,
