@@ -170,6 +170,18 @@ double merit(const Fit &with, const Fit &without)
 namespace
 {
 
+/* True if the load goes to and fro at one rate and amplitude, and at the same rate in all recordings. */
+bool repeats_one_cycle(const Problem &problem)
+{
+	double shortest = INFINITY, longest = 0;
+	for (const tactus_series *series : problem.segments) {
+		const double period = tactus_series_one_period_s(series);
+		shortest = std::fmin(shortest, period);
+		longest = std::fmax(longest, period);
+	}
+	return shortest > 0 && longest < (1 + limits.one_rate) * shortest;
+}
+
 class Decider
 {
   public:
@@ -197,6 +209,8 @@ class Decider
 	void select();
 	void prune();
 	bool more_of(const Cause &other, const Cause &cause) const;
+	bool loops(const tactus_effect *a, const tactus_effect *b) const;
+	Fit best_form(const Fit &left, const Scored &s) const;
 	bool challenge(Cause &cause);
 	void add_alike(Cause &cause) const;
 	void settle();
@@ -214,6 +228,7 @@ class Decider
 	const Problem &problem;
 	const Around &around;
 	std::unique_ptr<Shelf> shelf;
+	bool one_rate = false; /* the load only repeats one cycle */
 	Decision d;
 };
 
@@ -328,17 +343,46 @@ void Decider::prune()
 
 /*
  * True if a stronger cause says as much twice (a lag of second order, a creep of two times) as it does with this one
- * beside it: then its form is what is not exact.
+ * beside it, or if both make one loop that the stronger one nearly makes alone: then its form is what is not exact.
  */
 bool Decider::more_of(const Cause &other, const Cause &cause) const
 {
 	const Fit &left = cause.without;
 	if (!(other.without.cost > left.cost) || has_instants(other.effect))
 		return false;
+	if (loops(other.effect, cause.effect)) { /* two forms for the outline of one loop */
+		const Fit neither = without(left, other.effect);
+		return neither.ok && merit(left, neither) <= (1 - limits.loop_margin) * merit(d.final, neither);
+	}
 	Hypothesis twice = left.hypothesis;
 	twice.add(problem.domain, Screen(problem, left).score(*shelf, other.effect).part);
 	const Fit fit = problem.fit(twice, Rows::train);
 	return fit.ok && merit(fit, left) <= limits.far * merit(d.final, left);
+}
+
+/*
+ * Two causes of a loop, and one loop only: its outline is then all that tells them apart, and by as much do two forms
+ * of the one cause differ.
+ */
+bool Decider::loops(const tactus_effect *a, const tactus_effect *b) const
+{
+	return one_rate && (a->flags & b->flags & TACTUS_EFFECT_LOOP);
+}
+
+/* An effect joined to a fit as it was scored, or by one of its forms alone: together they may end in a worse place. */
+Fit Decider::best_form(const Fit &left, const Scored &s) const
+{
+	Fit best = join(problem, left, s.part);
+	const int terms = terms_of(s.part.effect);
+	for (int term = 0; terms > 1 && term < terms; term++) {
+		const Part part = Screen(problem, left).score(*shelf, s.part.effect, term).part;
+		if (part.free.empty())
+			continue;
+		const Fit fit = join(problem, left, part);
+		if (fit.ok && (!best.ok || fit.cost < best.cost))
+			best = fit;
+	}
+	return best;
 }
 
 /*
@@ -366,11 +410,12 @@ bool Decider::challenge(Cause &cause)
 		if (tried == limits.tried || s.part.free.empty() || !(s.cost < limits.hopeless * own))
 			break;
 		tried++;
-		const Fit other = join(problem, left, s.part);
+		const Fit other = loops(cause.effect, s.part.effect) ? best_form(left, s) : join(problem, left, s.part);
 		if (!other.ok)
 			continue;
 		const double t = paired(problem, problem.held_out(other), ours), theirs = merit(other, left);
-		const bool apart = theirs - mine > std::fmax(limits.margin, -limits.relative_margin * mine) &&
+		const double share = loops(cause.effect, s.part.effect) ? limits.loop_margin : limits.relative_margin;
+		const bool apart = theirs - mine > std::fmax(limits.margin, -share * mine) &&
 						   (t > limits.paired || (t > 0 && theirs > limits.far * mine));
 		if (testable(s.part.effect) && theirs < mine - limits.margin && (!better.ok || theirs < merit(better, left))) {
 			better = other;
@@ -734,6 +779,7 @@ bool Decider::begin()
 		return false;
 	/* Around the base by least squares: weighted by coloured noise, a gross misfit may turn its very sign. */
 	shelf = std::make_unique<Shelf>(around);
+	one_rate = repeats_one_cycle(problem);
 	select();
 	return true;
 }

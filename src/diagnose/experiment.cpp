@@ -28,7 +28,7 @@ const Item menu[] = {
 	{"repeat 10 (tap {H} 200ms, rest 1s)", 500, "taps, sampled fast",
 	 "a late reading keeps their shape, a lag does not", "lag time-offset"},
 	{"sine 0.2Hz {L}..{H} 40s, sine 2Hz {L}..{H} 10s, sine 0.2Hz {L}..{M} 40s, sine 2Hz {L}..{M} 10s", 50,
-	 "two rates and two amplitudes", "friction knows no rate, a lag no amplitude", "hysteresis lag time-offset"},
+	 "two rates and two amplitudes", "friction knows no rate, a lag no amplitude", "hysteresis lag creep time-offset"},
 	{"cycle 0.5Hz {L}..{H} 120s, hold {H} 120s, cycle 0.5Hz {L}..{H} 120s, rest 60s", 10, "cycling against holding",
 	 "only the one wears", "cyclic-decline linear-decline creep drift"},
 	{"cycle 0.5Hz {L}..{H} 900s", 5, "cycling for long", "an exponential ends, a line does not",

@@ -109,6 +109,14 @@ const tactus_search *search_of(const tactus_effect *effect, size_t parameter)
 
 } // namespace
 
+int terms_of(const tactus_effect *effect)
+{
+	int terms = 1;
+	for (size_t p = 0; p < effect->parameter_count; p++)
+		terms = std::max(terms, term_of(effect, p) + 1);
+	return terms;
+}
+
 bool has_instants(const tactus_effect *effect)
 {
 	return std::any_of(effect->searches, effect->searches + effect->search_count,
@@ -439,15 +447,12 @@ double Screen::add_best(State &state, const Shelf::Term &term, Part &part) const
 	return best.cost;
 }
 
-Scored Screen::score(const Shelf &shelf, const tactus_effect *effect) const
+Scored Screen::score(const Shelf &shelf, const tactus_effect *effect, int only) const
 {
 	Scored result;
 	result.part = problem.neutral(effect);
 	State state{residual, q};
-	int terms = 1;
-	for (size_t p = 0; p < effect->parameter_count; p++)
-		terms = std::max(terms, term_of(effect, p) + 1);
-	for (int term = 0; term < terms; term++) {
+	for (int term = std::max(only, 0); term < (only < 0 ? terms_of(effect) : only + 1); term++) {
 		State trial = state;
 		Part part = result.part;
 		const double before = state.residual.squaredNorm(), cost = add_best(trial, shelf.term(effect, term), part);

@@ -16,6 +16,7 @@ namespace tactus::explain
 
 /* The term of an effect that a parameter belongs to (engine.h). */
 int term_of(const tactus_effect *effect, size_t parameter);
+int terms_of(const tactus_effect *effect);
 bool has_instants(const tactus_effect *effect);
 
 /* A term of an effect at one choice of what is searched over a grid: a column per strength, from `first` on. */
@@ -96,7 +97,8 @@ class Screen
 {
   public:
 	Screen(const Problem &problem, const Fit &fit);
-	Scored score(const Shelf &shelf, const tactus_effect *effect) const;
+	/* `only`: with the parameters of that term alone; -1: of all that help. */
+	Scored score(const Shelf &shelf, const tactus_effect *effect, int only = -1) const;
 	/* What more of an effect that is in the fit would help: further strengths, shapes, initial states. */
 	Part refine(const tactus_effect *effect) const;
 

@@ -657,6 +657,36 @@ computed() {
 	jq -e '.series[0] | [.causes[].effect] == ["lag"] and .structure_remains' said.json
 }
 
+# rubbed LOAD NOISE: what springs that slip, in parallel (Iwan 1966), leave of a load, with noise; newtons of load in t.
+rubbed() {
+	computed "time_s,force_N,conductance_S" "t, load, g" <<-EOP
+		rng = np.random.default_rng(1)
+		t = np.arange(2000) * 0.01
+		tri = lambda x: np.abs((x + 1) % 2 - 1)
+		load = $1
+		slip, carried, felt = 20 * np.array([0.02, 0.04, 0.08, 0.15, 0.3]), np.zeros(5), []
+		for step in np.diff(load, prepend=load[0]):
+		    carried = np.clip(carried + step, -slip, slip)
+		    felt.append(carried @ [0.3, 0.25, 0.2, 0.15, 0.1])
+		g = 1e-7 + 2e-6 * (load - 0.25 * np.array(felt) + $2 * rng.standard_normal(len(t)))
+	EOP
+}
+
+@test "friction under equal triangles is one loop, which creep makes too: ambiguous; two rates and amplitudes name it" {
+	local noise half
+	for noise in 0.03 0.1 0.2; do
+		for half in 1.7 3.1; do
+			rubbed "20 * tri(t / $half)" "$noise" >one_rate.csv
+			tactus diagnose one_rate.csv --json >said.json
+			jq -e '.verdict == "ambiguous" and
+				([.series[0].causes[0] | .effect, .rivals[].effect] | index("hysteresis") != null)' said.json
+		done
+		rubbed "np.where(t < 10, 20, 8) * tri(t / np.where(t % 10 < 6, 1, 0.1))" "$noise" >rates.csv
+		tactus diagnose rates.csv --json >said.json
+		jq -e '.verdict == "cause-found" and [.series[0].causes[].effect] == ["hysteresis"]' said.json
+	done
+}
+
 @test "what a time offset costs in newtons is measured at the re-stamped times" {
 	computed "time_s,force_N,conductance_S" "t, load(t), g" >offset.csv <<-'EOP'
 		rng = np.random.default_rng(6)
