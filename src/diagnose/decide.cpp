@@ -87,11 +87,6 @@ bool drop_idle(Hypothesis &h, const tactus_effect *effect, bool &changed)
 	return false;
 }
 
-} // namespace
-
-namespace
-{
-
 /* The part fitted beside the rest, in the best of the forms that it states: seen linearly, the wrong one may lead. */
 Fit fit_forms(const Problem &problem, const Fit &fit, const Part &part)
 {
@@ -105,7 +100,7 @@ Fit fit_forms(const Problem &problem, const Fit &fit, const Part &part)
 			continue;
 		for (int k = 0; k < search.count; k++) {
 			Part other = part;
-			other.value[search.parameter] = search.values[k];
+			other.value[search.parameter] = problem.ranged(effect->parameters[search.parameter], search.values[k]);
 			if (other.value[search.parameter] == part.value[search.parameter])
 				continue;
 			Hypothesis moved = fit.hypothesis;
