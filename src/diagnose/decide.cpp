@@ -211,6 +211,7 @@ class Decider
 	void settle();
 	double added(const double *variance) const;
 	void imprints();
+	std::vector<double> left_of(const Hypothesis &h) const;
 	void strays();
 	void adequacy();
 	void staleness();
@@ -585,13 +586,20 @@ double Decider::wandering(const Cause &cause) const
 	return foretold || leaps(problem, cause.without, d.final, cause.effect) ? 0 : std::fmax(share, 1e-3);
 }
 
-/* More than noise without a column that shows what: the noise was judged beside more functions than are mapped. */
-void Decider::strays()
+/* Squares of what a hypothesis leaves of each output, neither whitened nor weighted. */
+std::vector<double> Decider::left_of(const Hypothesis &h) const
 {
-	const VectorXd raw = problem.left(problem.levelled(d.base.hypothesis, Rows::train));
+	const VectorXd raw = problem.left(h);
 	std::vector<double> square(problem.output_count, 0);
 	for (const Run &run : problem.runs)
 		square[run.output] += raw.segment(run.first, run.count).squaredNorm();
+	return square;
+}
+
+/* More than noise without a column that shows what: the noise was judged beside more functions than are mapped. */
+void Decider::strays()
+{
+	const std::vector<double> square = left_of(problem.levelled(d.base.hypothesis, Rows::train));
 	for (size_t o = 0; o < problem.output_count; o++) {
 		const double times = std::sqrt(square[o] / std::fmax(double(problem.training_of[o]), 1)) / problem.floor(o);
 		if (problem.outputs[o] && times > std::fmax(limits.stray, d.stray)) {
@@ -711,13 +719,15 @@ void Decider::staleness()
 			d.moved.separated_by = twin.separated_by;
 		}
 	}
-	/* By plain least squares something must have moved too: what is unlike the model bends a base that slow noise
+	/* By plain least squares an output must have moved too: what is unlike the model bends a base that slow noise
 	 * weighs. */
 	Hypothesis level = now.hypothesis;
 	level.base = fixed.base;
-	level = problem.levelled(level, Rows::train);
-	if (!d.moved.slots.empty() &&
-		!(problem.left(level).squaredNorm() < (1 - 0.5 * limits.share) * problem.left(fixed).squaredNorm())) {
+	const std::vector<double> after = left_of(problem.levelled(level, Rows::train)), before = left_of(fixed);
+	bool plainly = false;
+	for (size_t o = 0; o < problem.output_count; o++)
+		plainly = plainly || after[o] < (1 - 0.5 * limits.share) * before[o];
+	if (!plainly) {
 		d.moved = Moved();
 		return;
 	}
@@ -740,13 +750,16 @@ void Decider::staleness()
 			tactus_metadata_get_number(evidence.provenance, effect->covariate, &then) == 1 &&
 			std::abs(tactus_series_maximum(problem.segments.front(), column) - then) <= 0.01 * std::abs(then) + 1e-9)
 			continue;
-		if (testable(effect))
+		/* A neighbour's load is known at other instants: loads that are the same are so but for that. */
+		const bool coupled = (effect->flags & TACTUS_EFFECT_NEIGHBOURS) != 0;
+		if (testable(effect) && !coupled)
 			continue;
+		const double close = std::fmax(limits.margin, coupled ? -limits.neighbour_margin * d.moved.delta : 0);
 		const Scored s = screen.score(*shelf, effect);
-		if (s.part.free.empty() || !(s.cost < d.moved.delta + 3 * limits.margin))
+		if (s.part.free.empty() || !(s.cost < d.moved.delta + 3 * close))
 			continue;
 		const Fit other = join(problem, as_is, s.part);
-		if (other.ok && other.cost - now.cost < limits.margin)
+		if (other.ok && other.cost - now.cost < close)
 			d.moved.rivals.push_back({effect, effect->name, other.cost - as_is.cost, false, true, other.hypothesis});
 	}
 }

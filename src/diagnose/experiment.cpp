@@ -324,7 +324,7 @@ const tactus_experiment *propose(Store &store, const Work &work, const char *dev
 			first = first || !r.effect ? first : &r;
 		}
 	const tactus_effect *effect = stale ? nullptr : d.causes.front().effect;
-	if (first && work.newtons()) {
+	if (first && work.newtons() && (first->effect->flags & TACTUS_EFFECT_NEIGHBOURS) == 0) { /* one load for all */
 		const Choice choice =
 			Menu(work).best([&](Synthetic &s) { return evidence_of(work, s, ours, first->hypothesis); });
 		if (choice.item && choice.evidence > limits.margin) {

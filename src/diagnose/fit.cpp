@@ -301,17 +301,21 @@ Hypothesis Problem::levelled(const Hypothesis &h, Rows which) const
 	Hypothesis result = h;
 	std::vector<Slot> base = slots(h);
 	base.erase(std::remove_if(base.begin(), base.end(), [](const Slot &slot) { return slot.part >= 0; }), base.end());
-	VectorXd y, r;
+	VectorXd y, r, weight(rows());
+	for (const Run &run : runs)
+		weight.segment(run.first, run.count).setConstant(floor(run.output) > 0 ? 1 / floor(run.output) : 1);
 	MatrixXd d;
 	double first = 0;
 	for (int round = 0; round < 2 && !base.empty(); round++) { /* once is enough where it is affine in them */
 		if (!simulate(result, y) || !derivatives(result, y, base, d))
 			return h;
-		r = measured - y;
+		r = (measured - y).cwiseProduct(weight);
 		mask(r, which);
 		first = round == 0 ? r.norm() : first;
-		for (Index j = 0; j < d.cols(); j++)
+		for (Index j = 0; j < d.cols(); j++) {
+			d.col(j).array() *= weight.array();
 			mask(d.col(j), which);
+		}
 		const VectorXd size = d.colwise().norm().transpose().cwiseMax(1e-300);
 		const VectorXd step = (d * size.cwiseInverse().asDiagonal()).colPivHouseholderQr().solve(r);
 		for (size_t j = 0; j < base.size(); j++) {
@@ -321,7 +325,7 @@ Hypothesis Problem::levelled(const Hypothesis &h, Rows which) const
 	}
 	if (base.empty() || !simulate(result, y))
 		return h;
-	r = measured - y;
+	r = (measured - y).cwiseProduct(weight);
 	mask(r, which);
 	return r.norm() < 0.98 * first ? result : h;
 }

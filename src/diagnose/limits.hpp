@@ -20,6 +20,7 @@ struct Limits {
 	double blur = 1.5;                  /* of the squares that the input's noise makes: what smooths it removes them */
 	double less_noise = 0.9;            /* of the noise at first, below which all is decided again */
 	double relative_margin = 0.08;      /* and as a share of what the cause explains: no form is exact */
+	double neighbour_margin = 0.02;     /* the same where a neighbour's load comes in, which is read between rows */
 	double loop_margin = 0.2;           /* the same between causes of loops, where one loop is all there is */
 	double one_rate = 0.2;              /* of a load's period, by which recordings of one rate may differ */
 	double margin = 10;                 /* over the runner-up, in Schwarz's criterion */

@@ -161,8 +161,8 @@ class Problem
 	/* The hypothesis at the least squares of whitened residuals over those rows, from where it stands. */
 	Fit fit(const Hypothesis &start, Rows which) const;
 	/*
-	 * The same with the base parameters that are free at plain least squares: weighted by slow noise they may leave a
-	 * level and a slope that nobody would draw. As it is where that changes little.
+	 * The same with the base parameters that are free at plain least squares, of outputs over their noise: weighted by
+	 * slow noise they may leave a level and a slope that nobody would draw. As it is where that changes little.
 	 */
 	Hypothesis levelled(const Hypothesis &h, Rows which) const;
 	/* Estimates blur from the residual at y (scaled): what the input says and the readings do not. */
