@@ -87,7 +87,12 @@ std::vector<double> steps_of(const Around &around, const Part &part, size_t para
 	const double step = around.problem.ranged(info, info.start) - info.neutral;
 	const Column small = around.column(part, parameter, info.neutral + 0.01 * step, coarse),
 				 large = small ? around.column(part, parameter, info.neutral + step, coarse) : small;
-	if (large && parallel(*small, *large, 0.99999))
+	bool line = large && parallel(*small, *large, 0.99999);
+	if (line && info.neutral - step >= info.lower) { /* a phase may fold on one side only */
+		const Column other = around.column(part, parameter, info.neutral - step, coarse);
+		line = other && parallel(*small, *other, 0.99999);
+	}
+	if (line)
 		return {info.neutral + step};
 	std::vector<double> values;
 	const std::vector<double> few = {0.01, 0.1, 0.4, 2, 10},
