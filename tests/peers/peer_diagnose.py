@@ -348,7 +348,12 @@ def hysteresis_of_comparator(s, p):
 
 
 def rectifier(s, p):
-    s["A"] = s["A"] + p["V"] * (s["f"] > 0)
+    ac, lost = s["f"] > 0, s["A"] + p["V"]
+    if p["dead_band"] and p["V"] < 0:
+        a, band = np.abs(s["A"]), -p["V"] * 2 / np.pi
+        ratio = band / np.maximum(a, band)
+        lost = a * (np.sqrt((1 - ratio) * (1 + ratio)) - ratio * np.arccos(ratio))
+    s["A"] = np.where(ac, lost, s["A"])
 
 
 def clipping(s, p):
@@ -400,7 +405,12 @@ def readout_effects(problem):
             2, lambda s, p: s.update(theta=s["theta"] + 2 * np.pi * s["f"] * p["s"]), "s", 0, -1e-3, 1e-3, 2e-7, 1e-7
         ),
         "comparator-hysteresis": one(2, hysteresis_of_comparator, "V", 0, 0, 100, 0.01, 0.005),
-        "rectifier-offset": one(2, rectifier, "V", 0, -100, 100, 0.01, 0.005),
+        "rectifier-offset": Effect(
+            2,
+            rectifier,
+            {"V": (0, -100, 100, 0.01, 0.005, STRENGTH), "dead_band": (0, 0, 1, 1, 1, CONSTANT)},
+            {"dead_band": ([0, 1], 0)},
+        ),
         "gain-error": one(2, lambda s, p: s.update(A=s["A"] * (1 + p["e"])), "e", 0, -0.9, 10, 0.05, 0.02),
         "output-clipping": Effect(
             2,

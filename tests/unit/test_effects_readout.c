@@ -226,6 +226,30 @@ static void offset_and_gain_act_on_the_amplitude_alone(void **unused)
 	rig_near(amplitude, 4.5, 1e-14);
 }
 
+/* The mean of what a dead band leaves of the sine, summed: of a small one nothing, of a large one all but the offset. */
+static void a_diode_keeps_a_band_of_every_half_wave(void **unused)
+{
+	(void)unused;
+	bench b = {0};
+	double amplitude, phase, offset = 0.2, band = offset * 2 / rig_pi;
+	add(&b, &tactus_effect_readout_rectifier_offset, "offset_V", -offset);
+	rig_set(b.effect[0], b.p[0], "dead_band", 1);
+	for (double peak = 0.05; peak < 40; peak *= 1.3) {
+		double mean = 0;
+		for (int i = 0; i < 100000; i++)
+			mean += fmax(peak * sin(0.5 * rig_pi * (i + 0.5) / 100000) - band, 0) / 100000;
+		read_one(&b, rg, 0, 1000, peak, &amplitude, &phase);
+		rig_near(amplitude, 0.5 * rig_pi * mean, 1e-8 * peak);
+		read_one(&b, rg, 0, 0, -peak, &amplitude, &phase);
+		rig_near(amplitude, peak, 1e-14); /* dc does not pass the rectifier */
+	}
+	read_one(&b, rg, 0, 1000, 1e4, &amplitude, &phase);
+	rig_near(amplitude, 1e4 - offset, 1e-5);
+	rig_set(b.effect[0], b.p[0], "offset_V", offset);
+	read_one(&b, rg, 0, 1000, 0.1, &amplitude, &phase);
+	rig_near(amplitude, 0.1 + offset, 1e-14); /* no band: it is added */
+}
+
 /* The mean of the clipped sine itself, summed; in the limit π/2 times the clip. */
 static void an_averaging_rectifier_reads_the_mean_of_the_clipped_sine(void **unused)
 {
@@ -338,6 +362,7 @@ int main(void)
 		cmocka_unit_test(delay_acts_before_the_fold_and_bias_after),
 		cmocka_unit_test(a_small_signal_crosses_late),
 		cmocka_unit_test(offset_and_gain_act_on_the_amplitude_alone),
+		cmocka_unit_test(a_diode_keeps_a_band_of_every_half_wave),
 		cmocka_unit_test(an_averaging_rectifier_reads_the_mean_of_the_clipped_sine),
 		cmocka_unit_test(settling_mixes_loads_that_follow_each_other),
 		cmocka_unit_test(quantisation_rounds_to_its_steps),
