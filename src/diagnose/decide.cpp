@@ -410,8 +410,11 @@ bool Decider::challenge(Cause &cause)
 		if (!other.ok)
 			continue;
 		const double t = paired(problem, problem.held_out(other), ours), theirs = merit(other, left);
-		const double share = loops(cause.effect, s.part.effect) ? limits.loop_margin : limits.relative_margin;
-		const bool apart = theirs - mine > std::fmax(limits.margin, -share * mine) &&
+		/* Of one loop the outline is all there is, and a form of more parameters is not less likely for it. */
+		const bool outlines = loops(cause.effect, s.part.effect);
+		const double share = outlines ? limits.loop_margin : limits.relative_margin,
+					 price = outlines ? std::log(double(problem.training)) * (other.parameters - d.final.parameters) : 0;
+		const bool apart = theirs - std::fmax(price, 0) - mine > std::fmax(limits.margin, -share * mine) &&
 						   (t > limits.paired || (t > 0 && theirs > limits.far * mine));
 		if (testable(s.part.effect) && theirs < mine - limits.margin && (!better.ok || theirs < merit(better, left))) {
 			better = other;

@@ -114,7 +114,8 @@ const struct tactus_effect tactus_effect_sensor_time_offset = {
 	.needs = "a force that changes fast enough against the sampling",
 	.confused_with = "lag (on one sine exactly the same): a tap sampled at a tenth of the lag separates them",
 	.stage = SENSOR_STAGE_INPUT,
-	.flags = TACTUS_EFFECT_RESTAMP | TACTUS_EFFECT_LOOKAHEAD | TACTUS_EFFECT_CLOCK | TACTUS_EFFECT_ORDER,
+	.flags = TACTUS_EFFECT_RESTAMP | TACTUS_EFFECT_LOOKAHEAD | TACTUS_EFFECT_CLOCK | TACTUS_EFFECT_ORDER |
+			 TACTUS_EFFECT_LOOP,
 	TACTUS_PARAMETERS(parameters),
 	.state_size = STATES,
 	.reset = reset,
