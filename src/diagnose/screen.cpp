@@ -80,27 +80,37 @@ bool parallel(const VectorXd &a, const VectorXd &b, double cosine)
 	return a.dot(b) > cosine * a.norm() * b.norm();
 }
 
-/* Values of a strength to look from: one where the answer is a line, several where it is not. */
-std::vector<double> steps_of(const Around &around, const Part &part, size_t parameter, bool coarse)
+/* Values of a strength to look from: `near`, where the answer is a line so far; others where it is none. */
+struct Steps {
+	bool line = false;
+	double near = 0;
+	std::vector<double> far;
+};
+
+Steps steps_of(const Around &around, const Part &part, size_t parameter, bool coarse)
 {
 	const tactus_parameter &info = part.effect->parameters[parameter];
 	const double step = around.problem.ranged(info, info.start) - info.neutral;
-	const Column small = around.column(part, parameter, info.neutral + 0.01 * step, coarse),
-				 large = small ? around.column(part, parameter, info.neutral + step, coarse) : small;
-	bool line = large && parallel(*small, *large, 0.99999);
-	if (line && info.neutral - step >= info.lower) { /* a phase may fold on one side only */
-		const Column other = around.column(part, parameter, info.neutral - step, coarse);
-		line = other && parallel(*small, *other, 0.99999);
-	}
-	if (line)
-		return {info.neutral + step};
-	std::vector<double> values;
+	const Column small = around.column(part, parameter, info.neutral + 0.01 * step, coarse);
+	auto line = [&](double times) {
+		const double value = info.neutral + times * step;
+		if (value > info.upper || value < info.lower)
+			return true;
+		const Column large = small ? around.column(part, parameter, value, coarse) : small;
+		return large && parallel(*small, *large, 0.99999);
+	};
+	Steps steps;
+	steps.near = info.neutral + step;
+	steps.line = line(1) && line(-1); /* a phase may fold, on one side only */
+	if (steps.line && line(10))
+		return steps;
 	const std::vector<double> few = {0.01, 0.1, 0.4, 2, 10},
 							  many = {1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1, 2, 4, 10, 30};
 	for (const double times : coarse ? few : many)
 		for (const double sign : {1.0, -1.0})
-			add_within(values, info, info.neutral + sign * times * step);
-	return values;
+			if (!steps.line || times > 1)
+				add_within(steps.far, info, info.neutral + sign * times * step);
+	return steps;
 }
 
 /* A parameter that is a strength itself and searched (a lag's time constant): its own grid is its steps. */
@@ -177,7 +187,7 @@ Grid grid_of(const Around &around, const tactus_effect *effect, int term, bool c
 			}
 		shapes = std::move(grown);
 	}
-	std::vector<size_t> lines;
+	std::map<size_t, Steps> lines;
 	for (const Point &shape : shapes) {
 		std::vector<Column> columns;
 		Point together = shape;
@@ -186,20 +196,24 @@ Grid grid_of(const Around &around, const tactus_effect *effect, int term, bool c
 			if (info.kind != TACTUS_STRENGTH || !problem.acts(info) || term_of(effect, p) != term)
 				continue;
 			const tactus_search *own = search_of(effect, p);
-			const bool line = std::find(lines.begin(), lines.end(), p) != lines.end();
-			const std::vector<double> steps = own    ? values_of(problem, effect, *own, coarse)
-											  : line ? std::vector<double>{problem.ranged(info, info.start)}
-													 : steps_of(around, shape.part, p, coarse);
-			if (steps.size() == 1 && !own) {
-				if (!line)
-					lines.push_back(p);
-				if (const Column column = around.column(shape.part, p, steps[0], coarse)) {
+			std::vector<double> far;
+			if (!own && !lines.count(p)) {
+				const Steps here = steps_of(around, shape.part, p, coarse);
+				if (here.line) /* for every shape, then */
+					lines[p] = here;
+				else
+					far = here.far;
+			}
+			if (own)
+				far = values_of(problem, effect, *own, coarse);
+			if (const auto line = lines.find(p); !own && line != lines.end()) {
+				far = line->second.far;
+				if (const Column column = around.column(shape.part, p, line->second.near, coarse)) {
 					together.strengths.push_back(p);
 					columns.push_back(make(column));
 				}
-				continue;
 			}
-			for (const double value : steps)
+			for (const double value : far)
 				if (const Column column = around.column(shape.part, p, value, coarse)) {
 					Point alone = shape;
 					alone.strengths = {p};
