@@ -156,10 +156,20 @@ static double earned(double parameters)
 	return std::fmax(1 - limits.parameter_share * parameters, 0.1);
 }
 
-/* An instant is one parameter of a form, though as dear to find as three. */
+/*
+ * An instant is one parameter of a form, though as dear to find as three; and what forms one output says nothing in
+ * another: the most that an output has counts.
+ */
 double merit(const Fit &with, const Fit &without)
 {
-	return (with.cost - without.cost) * earned(double(with.slots.size()) - double(without.slots.size()));
+	auto count = [](const Fit &fit, int output) {
+		return std::count_if(fit.slots.begin(), fit.slots.end(),
+							 [&](const Slot &slot) { return slot.info->output < 0 || slot.info->output == output; });
+	};
+	double most = 0;
+	for (int output = 0; output < TACTUS_OUTPUTS_MAX; output++)
+		most = std::fmax(most, double(count(with, output) - count(without, output)));
+	return (with.cost - without.cost) * earned(most);
 }
 
 namespace
@@ -413,7 +423,8 @@ bool Decider::challenge(Cause &cause)
 		/* Of one loop the outline is all there is, and a form of more parameters is not less likely for it. */
 		const bool outlines = loops(cause.effect, s.part.effect);
 		const double share = outlines ? limits.loop_margin : limits.relative_margin,
-					 price = outlines ? std::log(double(problem.training)) * (other.parameters - d.final.parameters) : 0;
+					 price =
+						 outlines ? std::log(double(problem.training)) * (other.parameters - d.final.parameters) : 0;
 		const bool apart = theirs - std::fmax(price, 0) - mine > std::fmax(limits.margin, -share * mine) &&
 						   (t > limits.paired || (t > 0 && theirs > limits.far * mine));
 		if (testable(s.part.effect) && theirs < mine - limits.margin && (!better.ok || theirs < merit(better, left))) {
