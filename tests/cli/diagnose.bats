@@ -687,6 +687,96 @@ rubbed() {
 	done
 }
 
+# Known loads in place of a sensor, at several frequencies and drives. SETUP, Python: what the bench does to them.
+known_loads() { # SETUP > CSV
+	computed "time_s,channel,reference_resistance_ohm,reference_capacitance_F,frequency_Hz,drive_V,amplitude_V,phase_rad" \
+		"t, k, R, C, f, V, A, P" <<-EOP
+			rng = np.random.default_rng(11)
+			n = 1200
+			t, k = np.arange(n) * 0.01, np.arange(n) % 8 + 1
+			R = rng.choice([2e3, 5e3, 1e4, 3e4, 1e5, 3e5], n)
+			C = rng.choice([2e-11, 1e-10, 5e-10, 2e-9], n)
+			f = rng.choice([1e3, 4e3, 1e4, 4e4, 1e5], n)
+			V = rng.choice([0.5, 1.0, 2.0, 4.0], n)
+			Rg, lost, sA, sP = 1000.0, 0.0, 1e-3, 1e-3
+			$1
+			H = Rg * (1 / R + 2j * np.pi * f * C)
+			sine = np.sin((np.arange(2000) + 0.5) * np.pi / 2000)
+			half = np.maximum(np.abs(V * H)[:, None] * sine - lost, 0).mean(axis=1) * np.pi / 2
+			A = half + sA * rng.standard_normal(n)
+			P = np.angle(H) + sP * rng.standard_normal(n)
+		EOP
+}
+names_of_a_readout() { # NAME...: exactly these, with confidence
+	jq -e --args '.verdict == "cause-found" and ([.series[0].causes[].effect] | sort) == ($ARGS.positional | sort)' "$@" <said.json
+}
+
+@test "a resistor that moved by the noise of the amplitude, beside a phase that is much noisier" {
+	known_loads 'Rg, sA, sP = 1000.8, 1e-3, 0.05' >moved.csv
+	printf '%s\n' 'kind = "model"' 'format = 1' 'domain = "readout"' 'form = "forward"' '[output.amplitude_V]' \
+		'[output.phase_rad]' '[[channel]]' 'channel = 1' 'base = { gain_resistor_ohm = 1000 }' >before.toml
+	tactus diagnose moved.csv -m before.toml --json >said.json
+	jq -e '.series[0].causes[0] | .effect == "stale-calibration" and .parameters[0].name == "gain_resistor_ohm"' said.json
+}
+
+generated() { # KIND SEED > CSV: a recording of the blind tests' generator, of the seeds that are for tuning
+	PYTHONPATH=$root/tests/blind "$PYTHON" -B -c "import generate
+print(generate.make_case('$1', $2).texts[0], end='')"
+}
+
+@test "a comparator that is early behind switches: phases fold, and no capacitance does that" {
+	for seed in 47002 47082; do
+		generated two/readout $seed >early.csv
+		tactus diagnose early.csv --json >said.json
+		names_of_a_readout comparator-delay switch-resistance
+	done
+}
+
+@test "a large feedback capacitance is one, though for a small one a delay would do" {
+	for seed in 47000 47001 47002; do
+		generated ambiguous/in_proportion_to_frequency/with $seed >large.csv
+		tactus diagnose large.csv --json >said.json
+		names_of_a_readout feedback-capacitance
+	done
+}
+
+@test "a diode takes a band of every half wave: an offset of the rectifier, and no gain error beside it" {
+	known_loads 'lost = 0.08' >band.csv
+	tactus diagnose band.csv --json >said.json
+	names_of_a_readout rectifier-offset
+	jq -e '.series[0].causes[0].parameters[0] | .name == "offset_V" and (.value + 0.08 * 3.14159265 / 2 | fabs) < 2e-3' said.json
+	generated two/readout 47053 >beside.csv
+	tactus diagnose beside.csv --json >said.json
+	names_of_a_readout comparator-hysteresis rectifier-offset
+}
+
+@test "a stack under one load, scanned channel by channel: a moved slope or crosstalk, and one sensor alone tells" {
+	computed "time_s,channel,force_N,conductance_S" "t, k, f, g" >stack.csv <<-'EOP'
+		rng = np.random.default_rng(5)
+		n = 6000
+		t, k = np.arange(n) * 0.02, np.arange(n) % 4 + 1
+		f = 50 + 30 * np.sin(1.1 * t) + 15 * np.sin(2.9 * t + 1)
+		coupled = np.where((k == 1) | (k == 4), 1.02, 1.04)
+		g = 1e-6 + 4e-7 * coupled * f + 2e-8 * rng.standard_normal(n)
+	EOP
+	{
+		printf '%s\n' 'kind = "model"' 'format = 1' 'domain = "sensor"' 'form = "forward"' '[output.conductance_S]'
+		for channel in 1 2 3 4; do
+			printf '%s\n' '[[channel]]' "channel = $channel" 'input_range = [0, 100]' 'base = { g0 = 1e-6, g1 = 4e-7 }'
+		done
+	} >alone.toml
+	tactus diagnose stack.csv -m alone.toml --json >said.json
+	jq -e 'all(.series[]; .verdict == "ambiguous" and
+		([.causes[0] | .effect, .rivals[].effect] == ["stale-calibration", "mechanical-crosstalk"]) and
+		(.next_experiment.text | contains("one sensor alone")))' said.json
+}
+
+@test "weak friction on one sine: of one outline the number of parameters does not decide" {
+	generated ambiguous/hysteresis_or_lag/without 47005 >weak.csv
+	tactus diagnose weak.csv --json >said.json
+	jq -e '.verdict == "ambiguous" and ([.series[0].causes[0] | .effect, .rivals[].effect] | index("hysteresis") != null)' said.json
+}
+
 @test "what a time offset costs in newtons is measured at the re-stamped times" {
 	computed "time_s,force_N,conductance_S" "t, load(t), g" >offset.csv <<-'EOP'
 		rng = np.random.default_rng(6)
@@ -766,8 +856,7 @@ left_over() {
 
 @test "readings that stop at the converter's last code: in three stretches of many; by as little as the noise" {
 	for seed in 45023 45037; do
-		PYTHONPATH=$root/tests/blind "$PYTHON" -B -c "import generate
-print(generate.make_case('one/output-clipping', $seed).texts[0], end='')" >last.csv
+		generated one/output-clipping $seed >last.csv
 		tactus diagnose last.csv --json >said.json
 		jq -e '.verdict == "cause-found" and [.series[0].causes[].effect] == ["output-clipping"]' said.json
 	done
