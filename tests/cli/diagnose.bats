@@ -755,7 +755,7 @@ print(generate.make_case('$1', $2).texts[0], end='')"
 		rng = np.random.default_rng(5)
 		n = 6000
 		t, k = np.arange(n) * 0.02, np.arange(n) % 4 + 1
-		f = 50 + 30 * np.sin(1.1 * t) + 15 * np.sin(2.9 * t + 1)
+		f = 50 + 30 * np.sin(3.1 * t) + 15 * np.sin(7.3 * t + 1)
 		coupled = np.where((k == 1) | (k == 4), 1.02, 1.04)
 		g = 1e-6 + 4e-7 * coupled * f + 2e-8 * rng.standard_normal(n)
 	EOP
