@@ -306,7 +306,7 @@ tsan: ## the tests that use threads under ThreadSanitizer
 
 .PHONY: sanitized
 sanitized: all tests
-	@scripts/run-tests $(BUILD) unit cli
+	@scripts/run-tests $(BUILD) cli unit
 
 THREADED := $(filter $(BUILD)/tests/test_threads $(BUILD)/tests/test_fit%,$(UNIT))
 .PHONY: threaded
