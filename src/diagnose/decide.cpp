@@ -363,7 +363,7 @@ bool Decider::more_of(const Cause &other, const Cause &cause) const
 	Hypothesis twice = left.hypothesis;
 	twice.add(problem.domain, Screen(problem, left).score(*shelf, other.effect).part);
 	const Fit fit = problem.fit(twice, Rows::train);
-	return fit.ok && merit(fit, left) <= limits.far * merit(d.final, left);
+	return fit.ok && merit(fit, left) <= limits.twice * merit(d.final, left);
 }
 
 /*

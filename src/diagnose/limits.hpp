@@ -32,6 +32,7 @@ struct Limits {
 	double half = 0.5;                  /* of what could be explained, that causes must explain to be named */
 	double hopeless = 0.4;              /* of the best evidence, below which a candidate is not fitted */
 	double far = 0.85;                  /* of a cause's evidence, below which a rival need not lose block by block */
+	double twice = 0.8;                 /* of two causes' evidence, that the stronger one twice may fall short by */
 	double jump_all = 0.95;             /* of what jumps and a walk explain together, that jumps must alone … */
 	double jump_foretold = 5;           /* … or else `paired` of them: it may be something that wanders */
 	double stray = 1.4;                 /* times the noise: more is not noise, whatever it is */

@@ -226,7 +226,8 @@ static void offset_and_gain_act_on_the_amplitude_alone(void **unused)
 	rig_near(amplitude, 4.5, 1e-14);
 }
 
-/* The mean of what a dead band leaves of the sine, summed: of a small one nothing, of a large one all but the offset. */
+/* The mean of what a dead band leaves of the sine, summed: of a small one nothing, of a large one all but the offset.
+ */
 static void a_diode_keeps_a_band_of_every_half_wave(void **unused)
 {
 	(void)unused;
