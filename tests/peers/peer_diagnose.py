@@ -573,27 +573,32 @@ class Diagnosis:
             if at == term and effect.parameters[key][5] != STRENGTH:
                 shapes = [(dict(v, **{key: g}), s + [key]) for g in grid for v, s in shapes]
         strengths = [k for k, t in effect.parameters.items() if t[5] == STRENGTH and effect.term(k) == term]
-        lines = set()
+        lines = {}  # strengths whose answer is a line around neutral: the values far out where it bends
         for values, searched in shapes:
             together = {}
             for key in strengths:
                 neutral, lower, upper, start = effect.parameters[key][:4]
-                steps = [start]
+                grid = neutral + (start - neutral) * np.stack([STEPS, -STEPS], 1).ravel()
+                steps = [g for g in grid if lower <= g <= upper]
                 if key in effect.searches:
                     steps = list(effect.searches[key][0])
-                elif key not in lines:
-                    small, large = (
-                        column(name, values, key, neutral + share * (start - neutral)) for share in (0.01, 1)
-                    )
-                    if small @ large > 0.99999 * np.linalg.norm(small) * np.linalg.norm(large):
-                        lines.add(key)
-                        together[key] = large
-                        continue
-                    grid = neutral + (start - neutral) * np.stack([STEPS, -STEPS], 1).ravel()
-                    steps = [g for g in grid if lower <= g <= upper]
-                elif key in lines:
-                    together[key] = column(name, values, key, start)
-                    continue
+                else:
+                    if key not in lines:
+                        small = column(name, values, key, neutral + 0.01 * (start - neutral))
+
+                        def line(times):
+                            value = neutral + times * (start - neutral)
+                            if not lower <= value <= upper:
+                                return True
+                            large = column(name, values, key, value)
+                            return small @ large > 0.99999 * np.linalg.norm(small) * np.linalg.norm(large)
+
+                        if line(1) and line(-1):
+                            bends = not line(10)
+                            lines[key] = [g for g in steps if bends and abs(g - neutral) > abs(start - neutral)]
+                    if key in lines:
+                        together[key] = column(name, values, key, start)
+                        steps = lines[key]
                 for value in steps:
                     yield dict(values, **{key: value}), searched, [key], column(name, values, key, value)[
                         :, None
