@@ -297,12 +297,12 @@ headers: ## each public header alone as C11, C17 and C++17, -pedantic -Werror
 
 .PHONY: asan
 asan: ## unit and command-line tests under AddressSanitizer and UBSan
-	+@$(parallel) BUILD=$(BUILD)/asan OPT='-O1 -g' WERROR= \
+	+@$(parallel) BUILD=$(BUILD)/asan OPT='-O1 -g1' WERROR= \
 		SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer' sanitized
 
 .PHONY: tsan
 tsan: ## the tests that use threads under ThreadSanitizer
-	+@$(parallel) BUILD=$(BUILD)/tsan OPT='-O1 -g' WERROR= SANITIZE='-fsanitize=thread' threaded
+	+@$(parallel) BUILD=$(BUILD)/tsan OPT='-O1 -g1' WERROR= SANITIZE='-fsanitize=thread' threaded
 
 .PHONY: sanitized
 sanitized: all tests
@@ -336,7 +336,7 @@ $(BUILD)/fuzz_%: tests/fuzz/fuzz_%.c $(STATIC)
 coverage: ## run unit and command-line tests with gcov and print what they reach
 	@scripts/setup --check
 	@find $(BUILD)/coverage -name '*.gcda' -delete 2>/dev/null || true
-	+@status=0; $(parallel) BUILD=$(BUILD)/coverage OPT='-O1 -g' WERROR= SANITIZE='--coverage -fprofile-update=atomic' sanitized || status=$$?; \
+	+@status=0; $(parallel) BUILD=$(BUILD)/coverage OPT='-O1 -g1' WERROR= SANITIZE='--coverage -fprofile-update=atomic' sanitized || status=$$?; \
 	gcovr --root . --filter 'src/' --filter 'cli/' --object-directory $(BUILD)/coverage $(BUILD)/coverage && exit $$status
 
 # ---- documents and installation ------------------------------------------------------------------------------------
