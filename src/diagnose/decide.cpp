@@ -416,12 +416,12 @@ bool Decider::challenge(Cause &cause)
 		if (tried == limits.tried || s.part.free.empty() || !(s.cost < limits.hopeless * own))
 			break;
 		tried++;
-		const Fit other = loops(cause.effect, s.part.effect) ? best_form(left, s) : join(problem, left, s.part);
+		const bool outlines = loops(cause.effect, s.part.effect);
+		const Fit other = outlines ? best_form(left, s) : join(problem, left, s.part);
 		if (!other.ok)
 			continue;
 		const double t = paired(problem, problem.held_out(other), ours), theirs = merit(other, left);
 		/* Of one loop the outline is all there is, and a form of more parameters is not less likely for it. */
-		const bool outlines = loops(cause.effect, s.part.effect);
 		const double share = outlines ? limits.loop_margin : limits.relative_margin,
 					 price =
 						 outlines ? std::log(double(problem.training)) * (other.parameters - d.final.parameters) : 0;
@@ -720,6 +720,8 @@ void Decider::staleness()
 		d.moved.slots.push_back(pick);
 		now = best;
 	}
+	if (d.moved.slots.empty())
+		return;
 	for (size_t i = 0; i < problem.domain->twin_count; i++) {
 		const tactus_twin &twin = problem.domain->twins[i];
 		const bool moved = std::any_of(d.moved.slots.begin(), d.moved.slots.end(),
@@ -748,9 +750,7 @@ void Decider::staleness()
 	d.moved.fit = now;
 	d.moved.fit.hypothesis = problem.levelled(now.hypothesis, Rows::train);
 	d.moved.delta = now.cost - as_is.cost;
-	d.stale = !d.moved.slots.empty();
-	if (!d.stale)
-		return;
+	d.stale = true;
 	/* Effects that do the same to the model as given: those that a recording of constant conditions cannot test. */
 	const Screen screen(problem, as_is);
 	for (size_t i = 0; problem.domain->effects[i]; i++) {

@@ -80,10 +80,9 @@ bool parallel(const VectorXd &a, const VectorXd &b, double cosine)
 	return a.dot(b) > cosine * a.norm() * b.norm();
 }
 
-/* Values of a strength to look from: `near`, where the answer is a line so far; others where it is none. */
+/* Whether the answer to a strength is a line as far as its start; values to look from where it is none. */
 struct Steps {
 	bool line = false;
-	double near = 0;
 	std::vector<double> far;
 };
 
@@ -100,7 +99,6 @@ Steps steps_of(const Around &around, const Part &part, size_t parameter, bool co
 		return large && parallel(*small, *large, 0.99999);
 	};
 	Steps steps;
-	steps.near = info.neutral + step;
 	steps.line = line(1) && line(-1); /* a phase may fold, on one side only */
 	if (steps.line && line(10))
 		return steps;
@@ -208,7 +206,7 @@ Grid grid_of(const Around &around, const tactus_effect *effect, int term, bool c
 				far = values_of(problem, effect, *own, coarse);
 			if (const auto line = lines.find(p); !own && line != lines.end()) {
 				far = line->second.far;
-				if (const Column column = around.column(shape.part, p, line->second.near, coarse)) {
+				if (const Column column = around.column(shape.part, p, problem.ranged(info, info.start), coarse)) {
 					together.strengths.push_back(p);
 					columns.push_back(make(column));
 				}
