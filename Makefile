@@ -322,7 +322,7 @@ fuzz: $(PROGRAM) ## fuzz recordings, models, protocols, the diagnosis and what d
 	+@$(parallel) BUILD=$(BUILD)/fuzz CC=clang CXX=clang++ OPT='-O1 -gline-tables-only' WERROR= \
 		CXXFLAGS='-O2 -fno-sanitize=undefined' \
 		SANITIZE='-fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer' fuzzers
-	@BUILD=$(BUILD) scripts/fuzz $(FUZZ_SECONDS)
+	@BUILD=$(BUILD) FUZZ_SEED=$(FUZZ_SEED) scripts/fuzz $(FUZZ_SECONDS)
 
 .PHONY: fuzzers
 fuzzers: $(FUZZ)

@@ -111,7 +111,7 @@ static int find_end(struct scan *scan, tactus_reader *reader)
 		const double *time = tactus_table_numbers(block, "time_s"), *sequence = tactus_table_numbers(block, "sequence");
 		last_s = time ? time[rows - 1] : last_s;
 		if (sequence && sequence[rows - 1] >= 0)
-			scan->after_scans = (uint64_t)sequence[rows - 1] + 1;
+			scan->after_scans = (uint64_t)fmin(sequence[rows - 1], 0x1p53) + 1;
 	}
 	scan->after_s = !(last_s >= 0) ? 0 : rate_Hz > 0 ? (floor(last_s * rate_Hz) + 1) / rate_Hz : last_s;
 	return rows < 0 ? (int)rows : 0;
@@ -253,10 +253,10 @@ static void show_progress(struct scan *scan, double since_s, bool end)
 	if (end)
 		fputs("\r\033[K", stderr);
 	else if (expected && done) {
-		const double left_s = (now_s - since_s) * ((double)expected / (double)done - 1);
-		fprintf(stderr, "\r\033[Kscan %llu of %llu, %.0f %%, %d:%02d to go", (unsigned long long)done,
-				(unsigned long long)expected, 100 * (double)done / (double)expected, (int)left_s / 60,
-				(int)left_s % 60);
+		const double left_s = floor((now_s - since_s) * ((double)expected / (double)done - 1));
+		fprintf(stderr, "\r\033[Kscan %llu of %llu, %.0f %%, %.0f:%02.0f to go", (unsigned long long)done,
+				(unsigned long long)expected, 100 * (double)done / (double)expected, floor(left_s / 60),
+				fmod(left_s, 60));
 	} else
 		fprintf(stderr, "\r\033[Kscan %llu", (unsigned long long)done);
 }

@@ -195,7 +195,7 @@ static int over_protocol(const struct cli *cli, const tactus_model *model, uint6
 		return cli_fail(cli, error);
 	/* Scans at 0, 1/rate, … before the end; a duration that is a whole number of periods must not gain one more. */
 	double scans = ceil(tactus_protocol_duration_s(loading.protocol) * loading.rate_Hz * (1 - 1e-12));
-	loading.scans = scans < 1 ? 1 : (uint64_t)scans;
+	loading.scans = scans < 1 ? 1 : (uint64_t)fmin(scans, 0x1p53);
 	int status = choose_channels(cli, model, &loading);
 	if (!status)
 		status = run_loading(cli, model, &loading, seed);

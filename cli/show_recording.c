@@ -34,8 +34,8 @@ struct clock {
 	double *time_s;
 	size_t n, capacity;
 	size_t backward, repeated;
-	double last_s, last_sequence, first_sequence;
-	size_t lost, sequence_gaps, sequence_backward;
+	double last_s, last_sequence, first_sequence, lost;
+	size_t sequence_gaps, sequence_backward;
 	bool has_time, has_sequence;
 };
 
@@ -139,7 +139,7 @@ static bool new_scan(struct clock *clock, double sequence)
 	else if (sequence < clock->last_sequence)
 		clock->sequence_backward++;
 	else if (sequence > clock->last_sequence + 1) {
-		clock->lost += (size_t)(sequence - clock->last_sequence - 1);
+		clock->lost += sequence - clock->last_sequence - 1;
 		clock->sequence_gaps++;
 	}
 	clock->last_sequence = sequence;
@@ -290,7 +290,7 @@ static void print_clock(const struct clock *clock, const struct rhythm *rhythm)
 	if (clock->repeated || clock->backward)
 		printf("       %zu times the same instant again, %zu times back in time\n", clock->repeated, clock->backward);
 	if (clock->has_sequence && !isnan(clock->last_sequence))
-		printf("scans: %.0f to %.0f, %zu lost in %zu gap%s%s\n", clock->first_sequence, clock->last_sequence,
+		printf("scans: %.0f to %.0f, %.0f lost in %zu gap%s%s\n", clock->first_sequence, clock->last_sequence,
 			   clock->lost, clock->sequence_gaps, clock->sequence_gaps == 1 ? "" : "s",
 			   clock->sequence_backward ? "; the numbers go back" : "");
 }
@@ -353,7 +353,7 @@ static void json_clock(struct cli_json *json, const struct clock *clock, const s
 	cli_json_object(json, "scans");
 	cli_json_number(json, "first", clock->first_sequence);
 	cli_json_number(json, "last", clock->last_sequence);
-	cli_json_number(json, "lost", clock->has_sequence ? (double)clock->lost : NAN);
+	cli_json_number(json, "lost", clock->has_sequence ? clock->lost : NAN);
 	cli_json_number(json, "gaps", clock->has_sequence ? (double)clock->sequence_gaps : NAN);
 	cli_json_close(json);
 }

@@ -3,6 +3,7 @@
 #define TACTUS_CORE_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include <tactus/error.h>
 
@@ -24,6 +25,12 @@ int tactus_fail_prefix(int code, const char *format, ...) TACTUS_PRINTF(2, 3);
 char *tactus_strndup(const char *text, size_t length);
 /** printf into fresh memory; NULL when memory runs out. */
 char *tactus_asprintf(const char *format, ...) TACTUS_PRINTF(1, 2);
+
+/** The whole part of a number that no one has checked: 0 of what is negative or none, at most 2^53. */
+static inline uint64_t tactus_whole(double number)
+{
+	return !(number > 0) ? 0 : number < 0x1p53 ? (uint64_t)number : UINT64_C(1) << 53;
+}
 
 #define TACTUS_COUNT(array) (sizeof(array) / sizeof((array)[0]))
 

@@ -154,7 +154,7 @@ static int next_record(ati *a, tactus_device *device, int64_t until_ns, tactus_a
 static int insist(ati *a, tactus_device *device, tactus_ati_record *record)
 {
 	for (int i = 0; i < ASKS; i++) {
-		const int code = next_record(a, device, tactus_clock_ns() + (int64_t)(1e9 * a->timeout_s), record);
+		const int code = next_record(a, device, tactus_clock_ahead_ns(a->timeout_s), record);
 		if (code != 0)
 			return code;
 		device->faults.timeouts++;
@@ -367,7 +367,7 @@ static int ati_reopen(tactus_device *device)
 	if (code < 0)
 		return code;
 	ask(a, TACTUS_ATI_REALTIME);
-	code = next_record(a, device, tactus_clock_ns() + (int64_t)(1e9 * a->timeout_s), &record);
+	code = next_record(a, device, tactus_clock_ahead_ns(a->timeout_s), &record);
 	return code == 0 ? tactus_fail(TACTUS_ERR_LOST, "udp://%s:%d: no records come", a->host, a->port) : code;
 }
 

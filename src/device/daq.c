@@ -147,7 +147,7 @@ int tactus_daq_select(tactus_daq *daq, const tactus_bench_sensor *sensor, enum t
 		return code;
 	daq->levels = levels;
 	daq->switched = true;
-	return tactus_clock_wait(tactus_clock_ns() + (int64_t)llround(1e9 * daq->plan.settle_s));
+	return tactus_clock_wait(tactus_clock_ahead_ns(daq->plan.settle_s));
 }
 
 tactus_reading tactus_daq_reading(const tactus_daq *daq, const tactus_bench_sensor *sensor, enum tactus_mode mode)

@@ -218,7 +218,7 @@ int tactus_device_stop(tactus_device *device)
 /* Waits in pieces, so that another thread can call it off. */
 static int pause_between(tactus_device *device, double seconds)
 {
-	const int64_t piece_ns = 100000000, until_ns = tactus_clock_ns() + (int64_t)(1e9 * seconds);
+	const int64_t piece_ns = 100000000, until_ns = tactus_clock_ahead_ns(seconds);
 	int code = TACTUS_OK;
 	while (code >= 0 && tactus_clock_ns() < until_ns && !device->cancelled) {
 		const int64_t next_ns = tactus_clock_ns() + piece_ns;

@@ -238,7 +238,7 @@ static int wait_ms(const tactus_emulator *emulator, int64_t end_ns)
 
 int tactus_emulator_serve(tactus_emulator *emulator, double timeout_s)
 {
-	const int64_t end_ns = tactus_clock_ns() + (int64_t)(1e9 * fmin(timeout_s, 1e6));
+	const int64_t end_ns = tactus_clock_ahead_ns(fmin(timeout_s, 1e6));
 	struct pollfd fds[DEVICES_MAX * TACTUS_EMULATE_FDS];
 	do {
 		size_t n = 0, counts[DEVICES_MAX];

@@ -14,6 +14,11 @@ int64_t tactus_clock_ns(void)
 	return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
+int64_t tactus_clock_ahead_ns(double seconds)
+{
+	return tactus_clock_ns() + (int64_t)(1e9 * fmin(seconds, 3e9));
+}
+
 int tactus_clock_wait(int64_t until_ns)
 {
 	const struct timespec until = {.tv_sec = (time_t)(until_ns / 1000000000), .tv_nsec = (long)(until_ns % 1000000000)};
@@ -73,7 +78,7 @@ int tactus_live_next(tactus_live *live, uint64_t *sequence)
 {
 	const double now_s = tactus_live_now_s(live);
 	if (live->period_s > 0 && now_s / live->period_s >= (double)live->next + 1)
-		live->next = (uint64_t)(now_s / live->period_s);
+		live->next = tactus_whole(now_s / live->period_s);
 	const double due_s = (double)live->next * live->period_s;
 	if (live->next >= live->count || fmax(now_s, due_s) >= live->end_s)
 		return 0;
@@ -90,7 +95,7 @@ uint64_t tactus_live_number(tactus_live *live, double time_s)
 {
 	const double number = live->period_s > 0 ? round(time_s / live->period_s) : 0;
 	if (number > (double)live->next)
-		live->next = (uint64_t)number;
+		live->next = tactus_whole(number);
 	return live->next++;
 }
 
@@ -100,7 +105,7 @@ void tactus_live_gap(tactus_live *live, double gap_s)
 	if (live->period_s > 0)
 		return;
 	const double scan_s = live->next > 0 && before_s > 0 ? before_s / (double)live->next : INFINITY;
-	live->next += (uint64_t)fmax(1, floor(gap_s / scan_s));
+	live->next += tactus_whole(fmax(1, gap_s / scan_s));
 }
 
 void tactus_timing_add(tactus_timing *timing, double seconds)

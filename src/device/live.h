@@ -9,6 +9,8 @@
 
 /* Nanoseconds of CLOCK_MONOTONIC, the one clock of all devices of a program. */
 int64_t tactus_clock_ns(void);
+/* The instant that lies so many seconds ahead of now; INFINITY and what would not fit are a century. */
+int64_t tactus_clock_ahead_ns(double seconds);
 /* Waits until that instant; TACTUS_ERR_INTERRUPTED if a signal came. */
 int tactus_clock_wait(int64_t until_ns);
 

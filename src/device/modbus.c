@@ -321,7 +321,7 @@ static int receive_frame(tactus_modbus *link, int64_t until_ns)
 	set_wait(link, 1e-9 * (double)(until_ns - tactus_clock_ns()));
 	const int length = modbus_receive_confirmation(link->context, link->frame);
 	const int error = errno;
-	link->quiet_ns = tactus_clock_ns() + (int64_t)(1e9 * link->silence_s);
+	link->quiet_ns = tactus_clock_ahead_ns(link->silence_s);
 	if (length >= 0)
 		return length;
 	if (is_loss(error))
@@ -341,7 +341,7 @@ static int refuse(tactus_modbus *link, const tactus_modbus_request *r, int excep
 /* The answer into link->frame. */
 static int receive(tactus_modbus *link, const tactus_modbus_request *r)
 {
-	const int64_t until_ns = tactus_clock_ns() + (int64_t)(1e9 * link->timeout_s);
+	const int64_t until_ns = tactus_clock_ahead_ns(link->timeout_s);
 	for (;;) {
 		const int length = receive_frame(link, until_ns);
 		if (length < 0)
@@ -372,9 +372,9 @@ static int receive(tactus_modbus *link, const tactus_modbus_request *r)
 static int wait_silence(tactus_modbus *link)
 {
 	const double quiet_s = fmax(link->silence_s, fmin(ADAPTER_S, link->timeout_s));
-	const int64_t end_ns = tactus_clock_ns() + (int64_t)(1e9 * fmax(link->timeout_s, 10 * quiet_s));
+	const int64_t end_ns = tactus_clock_ahead_ns(fmax(link->timeout_s, 10 * quiet_s));
 	while (tactus_clock_ns() < end_ns) {
-		const int ready = await(link, tactus_clock_ns() + (int64_t)(1e9 * quiet_s));
+		const int ready = await(link, tactus_clock_ahead_ns(quiet_s));
 		const long n = ready > 0 ? drain(link) : 0;
 		if (n < 0)
 			return (int)n;

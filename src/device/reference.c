@@ -158,7 +158,7 @@ static int start_thread(struct tactus_reference *r)
 
 static int wait_first(struct tactus_reference *r)
 {
-	const int64_t until_ns = tactus_clock_ns() + (int64_t)(1e9 * FIRST_PATIENCE_S);
+	const int64_t until_ns = tactus_clock_ahead_ns(FIRST_PATIENCE_S);
 	pthread_mutex_lock(&r->mutex);
 	while (r->count < FIRST_SAMPLES && r->error >= 0 && tactus_clock_ns() < until_ns)
 		wait_until(r, until_ns);
@@ -291,7 +291,7 @@ static size_t take_ready(struct tactus_reference *r, const tactus_device *device
 	pthread_mutex_lock(&r->mutex);
 	size_t n = ready(r, device);
 	while (r->over && n == 0 && r->held > 0 && r->error >= 0) { /* nothing else to do than to wait for it */
-		wait_until(r, tactus_clock_ns() + (int64_t)(1e9 * PATIENCE_S));
+		wait_until(r, tactus_clock_ahead_ns(PATIENCE_S));
 		n = ready(r, device);
 	}
 	if (r->over && r->error < 0)

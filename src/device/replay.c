@@ -173,7 +173,7 @@ static tactus_reading row_reading(const replay *r, size_t row)
 	const double sequence = number_at(block, "sequence", row, NAN), channel = number_at(block, "channel", row, NAN);
 	return (tactus_reading){
 		.time_s = number_at(block, "time_s", row, NAN),
-		.sequence = sequence >= 0 ? (uint64_t)sequence : r->row_number,
+		.sequence = sequence >= 0 ? tactus_whole(sequence) : r->row_number,
 		.channel = channel >= 0 && channel < 1e6 ? (int)channel : 1,
 		.mode = ac ? TACTUS_MODE_AC : TACTUS_MODE_DC,
 		.drive_V = number_at(block, "drive_V", row, NAN),

@@ -58,13 +58,13 @@ static int fail_lost(const robotiq *r, const char *why)
 static int stop_stream(robotiq *r)
 {
 	const int fd = tactus_modbus_descriptor(r->link);
-	const int64_t limit_ns = tactus_clock_ns() + (int64_t)(1e9 * QUIET_LIMIT_S);
+	const int64_t limit_ns = tactus_clock_ahead_ns(QUIET_LIMIT_S);
 	uint8_t jam[JAM], rest[256];
 	memset(jam, JAM_BYTE, sizeof(jam));
 	if (write(fd, jam, sizeof(jam)) != (ssize_t)sizeof(jam))
 		return fail_lost(r, errno != 0 ? strerror(errno) : "it takes nothing");
 	for (;;) {
-		const int code = tactus_clock_wait_readable(fd, tactus_clock_ns() + (int64_t)(1e9 * QUIET_S));
+		const int code = tactus_clock_wait_readable(fd, tactus_clock_ahead_ns(QUIET_S));
 		if (code <= 0) {
 			tactus_modbus_distrust(r->link);
 			return code;
@@ -194,7 +194,7 @@ static int next_frame(robotiq *r, tactus_device *device, int64_t until_ns, doubl
 /* The same; a stream that fell silent is asked for once more, then the sensor is lost. */
 static int insist(robotiq *r, tactus_device *device, double wrench[6])
 {
-	const int code = next_frame(r, device, tactus_clock_ns() + (int64_t)(1e9 * r->silence_s), wrench);
+	const int code = next_frame(r, device, tactus_clock_ahead_ns(r->silence_s), wrench);
 	if (code != 0)
 		return code;
 	device->faults.timeouts++;
@@ -202,7 +202,7 @@ static int insist(robotiq *r, tactus_device *device, double wrench[6])
 	const int asked = start_stream(r);
 	if (asked < 0)
 		return asked == TACTUS_ERR_INTERRUPTED ? asked : fail_lost(r, "its stream stopped");
-	const int again = next_frame(r, device, tactus_clock_ns() + (int64_t)(1e9 * r->silence_s), wrench);
+	const int again = next_frame(r, device, tactus_clock_ahead_ns(r->silence_s), wrench);
 	return again == 0 ? fail_lost(r, "its stream stopped") : again;
 }
 

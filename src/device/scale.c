@@ -229,7 +229,7 @@ static int hid_start(tactus_device *device, const tactus_scan_settings *settings
 static int await_report(tactus_device *device, uint8_t *report, size_t size)
 {
 	scale *s = device->state;
-	const int64_t until_ns = tactus_clock_ns() + (int64_t)(1e9 * fmin(s->timeout_s, 86400));
+	const int64_t until_ns = tactus_clock_ahead_ns(fmin(s->timeout_s, 86400));
 	for (;;) {
 		const int64_t left_ms = (until_ns - tactus_clock_ns() + 999999) / 1000000;
 		if (tactus_live_over(&device->live) || left_ms <= 0)

@@ -411,7 +411,7 @@ static int serial_start(tactus_device *device, const tactus_scan_settings *setti
 {
 	serial *s = device->state;
 	int code = refuse_settings(s, settings);
-	code = code < 0 ? code : wait_header(s, tactus_clock_ns() + (int64_t)(1e9 * FIRST_LINE_S));
+	code = code < 0 ? code : wait_header(s, tactus_clock_ahead_ns(FIRST_LINE_S));
 	code = code < 0 ? code : place_columns(s, device);
 	code = code < 0 ? code : choose_channels(s, settings);
 	code = code < 0 ? code : warm_up(s, device);
@@ -473,12 +473,12 @@ static void put_line(serial *s, tactus_device *device, const double *values, dou
 /* The readings of the next line that has any: 1, 0 when the scan is over, or an error. */
 static int take_line(serial *s, tactus_device *device)
 {
-	const int64_t until_ns = tactus_clock_ns() + (int64_t)(1e9 * s->silence_s);
+	const int64_t until_ns = tactus_clock_ahead_ns(s->silence_s);
 	double values[TACTUS_LINE_FIELDS_MAX];
 	while (!tactus_live_over(&device->live)) {
 		size_t length;
 		const double left_s = device->live.end_s - tactus_live_now_s(&device->live);
-		const int64_t end_ns = left_s < 1e9 ? tactus_clock_ns() + (int64_t)(1e9 * left_s) : INT64_MAX;
+		const int64_t end_ns = tactus_clock_ahead_ns(left_s);
 		const int code = next_line(s, until_ns < end_ns ? until_ns : end_ns, &length);
 		if (code < 0)
 			return code;

@@ -65,10 +65,10 @@ void sim_sensor_free(sim_sensor *sensor)
 static double wander(uint64_t seed, uint64_t stream, double travel)
 {
 	const double knot = floor(travel), part = travel - knot;
-	const double a = tactus_random_normal(seed, stream, (uint64_t)knot);
+	const double a = tactus_random_normal(seed, stream, tactus_whole(knot));
 	if (part == 0)
 		return a;
-	const double b = tactus_random_normal(seed, stream, (uint64_t)knot + 1);
+	const double b = tactus_random_normal(seed, stream, tactus_whole(knot) + 1);
 	return ((1 - part) * a + part * b) / sqrt((1 - part) * (1 - part) + part * part);
 }
 

@@ -55,7 +55,7 @@ static double longest_s(const tactus_sim *sim)
 static uint64_t scans_in(const tactus_sim *sim, double duration_s)
 {
 	const double scans = floor(duration_s / sim->plan.period_s * (1 + 1e-12) + 1e-6);
-	return scans < 1 ? 1 : (uint64_t)fmin(scans, 1e15);
+	return scans < 1 ? 1 : tactus_whole(scans);
 }
 
 /*

@@ -159,7 +159,7 @@ ForceErrors force_errors(const Work &work, const Hypothesis &h)
 			sample.frequency_Hz = value(SENSOR_FREQUENCY, i, NAN);
 			/* Readings of one scan are of one load, as `force` has it. */
 			const double scan = work.sequence[segment] ? work.sequence[segment][s->row[i * work.every]] : NAN;
-			sample.sequence = scan >= 0 ? uint64_t(scan) : i;
+			sample.sequence = scan >= 0 ? tactus_whole(scan) : i;
 			sample.channel = work.channel;
 			sample.ac = value(SENSOR_FREQUENCY, i, 0) > 0;
 			tactus_force force;

@@ -208,7 +208,7 @@ static tactus_sample sample_of(const tactus_work *work, const place *at, const d
 	sample.frequency_Hz = signal_at(s, SENSOR_FREQUENCY, i, NAN);
 	sample.temperature_degC = signal_at(s, SENSOR_TEMPERATURE, i, NAN);
 	double number = sequence ? sequence[s->row[i]] : NAN;
-	sample.sequence = number >= 0 ? (uint64_t)number : (uint64_t)(at->point == SIZE_MAX ? 0 : at->point);
+	sample.sequence = number >= 0 ? tactus_whole(number) : (uint64_t)(at->point == SIZE_MAX ? 0 : at->point);
 	sample.ac = (strcmp(s->mode[1] ? s->mode[1] : "", "ac") == 0 && isfinite(sample.capacitance_F)) ||
 				strcmp(s->mode[0] ? s->mode[0] : "", "ac") == 0;
 	return sample;

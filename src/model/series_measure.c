@@ -1,6 +1,7 @@
 /* How much of a signal a series holds: what the `testable` hooks of effects ask. */
 #include <math.h>
 
+#include "core/core.h"
 #include "model/engine.h"
 #include "model/series.h"
 
@@ -108,7 +109,7 @@ static double still_share(const tactus_series *series, double period_s, double r
 {
 	const double *time = tactus_series_clock(series);
 	double step = period_s / 32;
-	size_t still = 0, count = 0, steps = (size_t)((time[series->n - 1] - time[0]) / step);
+	size_t still = 0, count = 0, steps = tactus_whole((time[series->n - 1] - time[0]) / step);
 	for (size_t k = 0; k < steps; k++) {
 		double t = time[0] + (double)k * step;
 		double moved = fabs(tactus_series_load_at(series, t + step) - tactus_series_load_at(series, t));
@@ -138,9 +139,10 @@ double tactus_series_one_period_s(const tactus_series *series)
 		low[k] = fmin(low[k], extreme);
 		high[k] = fmax(high[k], extreme);
 	}
-	double range = s.threshold / 0.05, alike = 0.2;
-	if (!(shortest > 0) || longest > (1 + alike) * shortest || high[0] - low[0] > alike * range ||
-		high[1] - low[1] > alike * range)
+	/* A period has two readings at least: where more would fit than that, it stands still most of the time. */
+	double range = s.threshold / 0.05, alike = 0.2, whole = time[series->n - 1] - time[0];
+	if (!(shortest > 0) || !(whole < (double)series->n * shortest) || longest > (1 + alike) * shortest ||
+		high[0] - low[0] > alike * range || high[1] - low[1] > alike * range)
 		return 0;
 	double period = (shortest + longest) / 2;
 	return still_share(series, period, range) < 0.2 ? period : 0;

@@ -106,7 +106,7 @@ int tactus_demodulator_new(const tactus_waveform *waveform, tactus_demodulator *
 	d->waveform.modes = NULL; /* the caller's */
 	d->waveform.channels = d->channels;
 	d->waveform.channel_count = count;
-	d->settle = (uint64_t)ceil(waveform->settle_s * waveform->rate_Hz - 1e-6);
+	d->settle = tactus_whole(ceil(waveform->settle_s * waveform->rate_Hz - 1e-6));
 	d->first_channel = NAN;
 	tactus_lockin_prepare(&d->reference,
 						  has_mode(waveform, "ac") ? 2 * M_PI * waveform->frequency_Hz / waveform->rate_Hz : 0, BLOCK);
