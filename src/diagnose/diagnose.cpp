@@ -141,7 +141,7 @@ void Diagnosis::explain(Work &work)
 		given = &options.model->channels[0];
 	if (given) {
 		for (size_t i = 0; i < problem.domain->base_count; i++)
-			if (std::isfinite(given->base[i]))
+			if (tactus_model_has(options.model, &problem.domain->base[i]))
 				base.base[i] = given->base[i];
 		for (size_t k = 0; k < options.model->effect_count; k++) {
 			Part part = problem.neutral(options.model->effects[k]);
@@ -165,6 +165,13 @@ void Diagnosis::explain(Work &work)
 	const Fit plain = problem.fit(base, Rows::all); /* by least squares, the noise not yet known */
 	if (!plain.ok)
 		return;
+	/* What a model does not predict (fitted to conductance alone) it cannot be wrong about: only causes show there. */
+	for (size_t i = 0; given && i < problem.domain->base_count; i++)
+		if (!tactus_model_has(options.model, &problem.domain->base[i])) {
+			work.given.base[i] = plain.hypothesis.base[i];
+			work.given.base_free.erase(std::remove(work.given.base_free.begin(), work.given.base_free.end(), i),
+									   work.given.base_free.end());
+		}
 	VectorXd y;
 	problem.simulate(plain.hypothesis, y);
 	problem.estimate_blur(y);

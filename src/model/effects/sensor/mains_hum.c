@@ -12,7 +12,7 @@ static const tactus_parameter parameters[] = {
 	 TACTUS_STRENGTH, 1},
 	{"capacitance_cosine_F", "output1", "amplitude of the cosine in the capacitance", 0, -1e9, 1e9, 0.01, 0.005,
 	 TACTUS_STRENGTH, 1},
-	{"mains_Hz", "Hz", "frequency of the mains", 50, 1, 1000, 50, 10, TACTUS_CONSTANT, -1},
+	{"mains_Hz", "Hz", "frequency of the mains", 50, 1, 1000, 50, 1e-3, TACTUS_SHAPE, -1},
 };
 
 /* A sine at the mains frequency in the recording's own time: its alias comes from the sampling by itself. */
@@ -28,11 +28,18 @@ static void process(const double *p, double *state, size_t n, double *const *sig
 	}
 }
 
-/* Whole cycles of the mains, or of its alias, that a series holds. */
-static double cycles(const tactus_series *series, double mains_Hz)
+static const double nominal_Hz[] = {50, 60};
+enum { NOMINALS = sizeof nominal_Hz / sizeof nominal_Hz[0], PEAKS = 4, LOOKS = 1000 };
+static const double tolerance_Hz = 0.1; /* of the mains and of a board's clock together */
+
+/*
+ * How fast the mains seems to swing in the samples; 0 if that is too near to standing still: within its tolerance it
+ * would be any slow change then.
+ */
+static double alias_Hz(const tactus_series *series, double mains_Hz)
 {
-	double per_step = mains_Hz * series->dt;
-	return fabs(per_step - round(per_step)) * tactus_series_duration_s(series) / series->dt;
+	double per_step = mains_Hz * series->dt, alias = fabs(per_step - round(per_step)) / series->dt;
+	return alias > 2 * tolerance_Hz && alias * tactus_series_duration_s(series) >= 2 ? alias : 0;
 }
 
 static const char *testable(const tactus_series *series)
@@ -40,13 +47,77 @@ static const char *testable(const tactus_series *series)
 	const char *why = tactus_want_clock(series);
 	if (why)
 		return why;
-	return fmax(cycles(series, 50), cycles(series, 60)) >= 2
-			   ? NULL
-			   : "fewer than two cycles of the mains or its alias: the sampling is in step with it, or too short";
+	for (size_t k = 0; k < NOMINALS; k++)
+		if (alias_Hz(series, nominal_Hz[k]) > 0)
+			return NULL;
+	return "fewer than two cycles of the mains or its alias: the sampling is in step with it, or too short";
 }
 
-static const tactus_search searches[] = {
-	{FREQUENCY, TACTUS_SEARCH_VALUES, 10, {50, 60, 49.98, 50.02, 59.98, 60.02, 49.95, 50.05, 59.95, 60.05}}};
+/* Adds the power of an output's changes, less those that go with the load's, at `looks` frequencies from first_Hz on.
+ */
+static void add_power(const tactus_series *series, size_t output, double first_Hz, double step_Hz, size_t looks,
+					  double *power)
+{
+	const double *time = tactus_series_clock(series), *load = series->signal[SENSOR_FORCE],
+				 *value = series->signal[output];
+	double re[LOOKS] = {0}, im[LOOKS] = {0}, cross = 0, square = 0, total = 0;
+	for (size_t i = 1; i < series->n; i++) {
+		double moved = load[i] - load[i - 1], change = value[i] - value[i - 1];
+		if (isnan(moved + change))
+			continue;
+		cross += moved * change;
+		square += moved * moved;
+	}
+	double slope = square > 0 ? cross / square : 0;
+	for (size_t i = 1; i < series->n; i++) {
+		double left = value[i] - value[i - 1] - slope * (load[i] - load[i - 1]), turns = first_Hz * time[i];
+		if (isnan(left + turns))
+			continue;
+		total += left * left;
+		double angle = 2 * TACTUS_PI * (turns - floor(turns)), x = left * cos(angle), y = left * sin(angle);
+		double c = cos(2 * TACTUS_PI * step_Hz * time[i]), s = sin(2 * TACTUS_PI * step_Hz * time[i]);
+		for (size_t k = 0; k < looks; k++) {
+			re[k] += x;
+			im[k] += y;
+			double turned = c * x - s * y;
+			y = s * x + c * y;
+			x = turned;
+		}
+	}
+	for (size_t k = 0; k < looks && total > 0; k++)
+		power[k] += (re[k] * re[k] + im[k] * im[k]) / total;
+}
+
+/* The strongest lines near each nominal frequency, from where a fit finds the frequency itself. */
+static size_t propose(const tactus_series *series, size_t parameter, double *values, size_t most)
+{
+	(void)parameter;
+	size_t count = 0;
+	double duration_s = tactus_series_duration_s(series);
+	for (size_t n = 0; n < NOMINALS; n++) {
+		if (!(alias_Hz(series, nominal_Hz[n]) > 0))
+			continue;
+		double power[LOOKS] = {0}, first_Hz = nominal_Hz[n] - tolerance_Hz;
+		double step_Hz = fmax(0.5 / duration_s, 2 * tolerance_Hz / (LOOKS - 1));
+		size_t looks = (size_t)(2 * tolerance_Hz / step_Hz) + 1;
+		for (size_t output = SENSOR_G; output <= SENSOR_C; output++)
+			if (series->signal[output] != NULL)
+				add_power(series, output, first_Hz, step_Hz, looks, power);
+		for (size_t peak = 0; peak < PEAKS && count < most; peak++) {
+			size_t best = 0;
+			for (size_t k = 1; k < looks; k++)
+				best = power[k] > power[best] ? k : best;
+			if (!(power[best] > 0))
+				break;
+			values[count++] = first_Hz + (double)best * step_Hz;
+			for (size_t k = best < 2 ? 0 : best - 2; k < looks && k <= best + 2; k++)
+				power[k] = 0;
+		}
+	}
+	return count;
+}
+
+static const tactus_search searches[] = {{FREQUENCY, TACTUS_SEARCH_PROPOSED, 0, {0}}};
 
 const struct tactus_effect tactus_effect_sensor_mains_hum = {
 	.name = "mains-hum",
@@ -62,4 +133,5 @@ const struct tactus_effect tactus_effect_sensor_mains_hum = {
 	.process = process,
 	TACTUS_SEARCHES(searches),
 	.testable = testable,
+	.propose = propose,
 };
