@@ -48,8 +48,8 @@ static void cards(const struct html *html, const tactus_diagnosed *series)
 	const tactus_base_error *base = cli_worst_base(series);
 	const tactus_gain *gain = series->gain;
 	fputs("<ul class=\"cards\">\n", html->out);
-	if (gain && isfinite(gain->force_rmse_before_N))
-		card(html, cli_si(gain->force_rmse_before_N, "N", 2, text), "off, in force");
+	if (isfinite(series->force_rmse_N))
+		card(html, cli_si(series->force_rmse_N, "N", 2, text), "off, in force");
 	if (base) {
 		snprintf(label, sizeof label, "off, in %s", cli_quantity_name(base->output, name));
 		card(html, cli_si(base->rmse, base->unit, 2, text), label);
@@ -74,16 +74,14 @@ static void overview(const struct html *html)
 	for (size_t s = 0; s < html->diagnosis->series_count; s++) {
 		const tactus_diagnosed *series = &html->diagnosis->series[s];
 		const tactus_base_error *base = cli_worst_base(series);
-		bool newtons = series->gain && isfinite(series->gain->force_rmse_before_N);
 		fprintf(html->out,
 				"<tr><td><a href=\"#channel-%d\">%d</a></td><td><span class=\"%s\">%s</span><br><span class=\"soft\">",
 				series->channel, series->channel, tone(series->verdict), cli_verdict_words(series->verdict));
 		causes_of(html, series);
 		fputs("</span></td>", html->out);
-		if (newtons)
-			html_number(html, series->gain->force_rmse_before_N,
-						cli_si(series->gain->force_rmse_before_N, "N", 2, text),
-						".series[%zu].gain.force_rmse_before_N", s);
+		if (isfinite(series->force_rmse_N))
+			html_number(html, series->force_rmse_N, cli_si(series->force_rmse_N, "N", 2, text),
+						".series[%zu].force_rmse_N", s);
 		else
 			html_cell(html, base ? cli_si(base->rmse, base->unit, 2, text) : "–");
 		if (series->gain)

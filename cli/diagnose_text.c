@@ -48,8 +48,8 @@ static const char *recordings_name(const tactus_diagnosis *diagnosis, char text[
 static const char *off_by(const tactus_diagnosed *series, char text[64])
 {
 	const tactus_base_error *base = cli_worst_base(series);
-	if (series->gain && isfinite(series->gain->force_rmse_before_N))
-		return cli_si(series->gain->force_rmse_before_N, "N", 2, text);
+	if (isfinite(series->force_rmse_N))
+		return cli_si(series->force_rmse_N, "N", 2, text);
 	return base ? cli_si(base->rmse, base->unit, 2, text) : "–";
 }
 
@@ -127,6 +127,8 @@ static void say_measured(const struct page *page, const tactus_diagnosed *series
 		words_add(&words, ", %zu readings", series->samples);
 	if (series->left_out)
 		words_add(&words, ", %zu left out", series->left_out);
+	if (series->every > 1)
+		words_add(&words, ", every %zu-th of them all", series->every);
 	words_add(&words, ")");
 	for (size_t i = 0; i < series->base_count; i++) {
 		const tactus_base_error *base = &series->base[i];
@@ -160,6 +162,8 @@ static void say_causes(const struct page *page, const tactus_diagnosed *series)
 						  cli_si(parameter->given, parameter->unit, 4, then),
 						  cli_si_error(parameter->value, parameter->standard_error, parameter->unit, now));
 		}
+	if (series->moved)
+		page_item(page, "Moved", "beside that the calibration no longer holds: %s.", series->moved);
 }
 
 static void say_evidence(const struct page *page, const tactus_diagnosed *series)

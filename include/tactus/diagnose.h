@@ -139,6 +139,9 @@ typedef struct {
 	const char *summary;
 	const tactus_base_error *base;
 	size_t base_count;
+	/** Error of the model as given (refitted, where none is) read backwards, on the data of `gain`; NaN: no force. */
+	double force_rmse_N;
+	const char *moved; /**< beside the causes: parameters of the model as given that no longer hold, or NULL */
 	const tactus_dependence *wrong;
 	size_t wrong_count;
 	const tactus_cause *causes;

@@ -209,6 +209,7 @@ class Decider
 	}
 	std::vector<Scored> screen(const Fit &fit, bool all) const;
 	Fit best_next(const Fit &fit, const tactus_effect **effect) const;
+	bool between_readings(const Fit &with, const Fit &without) const;
 	bool stands(const Fit &with, const Fit &without) const;
 	Fit without(const Fit &fit, const tactus_effect *effect) const;
 	void select();
@@ -274,6 +275,21 @@ Fit Decider::best_next(const Fit &fit, const tactus_effect **effect) const
 	return best;
 }
 
+/*
+ * Of a thinned recording a memory is computed from the loads that were kept: that is off by up to a step, as if the
+ * load had come at another time.
+ */
+bool Decider::between_readings(const Fit &with, const Fit &without) const
+{
+	return problem.thinned && std::any_of(with.slots.begin(), with.slots.end(), [&](const Slot &slot) {
+			   if (slot.part < 0)
+				   return false;
+			   const Part &part = with.hypothesis.parts[size_t(slot.part)];
+			   return (part.effect->flags & TACTUS_EFFECT_RESTAMP) && !without.hypothesis.has(part.effect) &&
+					  std::abs(part.value[slot.index]) < problem.segments.front()->dt;
+		   });
+}
+
 bool Decider::stands(const Fit &with, const Fit &without) const
 {
 	/* A jump shows at its instant: the block that holds it cannot be foretold from the others. */
@@ -281,6 +297,8 @@ bool Decider::stands(const Fit &with, const Fit &without) const
 		return slot.part >= 0 && !without.hypothesis.has(with.hypothesis.parts[size_t(slot.part)].effect) &&
 			   instant(with.hypothesis.parts[size_t(slot.part)].effect, slot.index);
 	});
+	if (between_readings(with, without))
+		return false;
 	const bool jumps = instants == 1 || instants == 2; /* more are a staircase, which must foretell */
 	/* In one output at least it must be worth its while, beside what is left there and what the others removed. */
 	double share = 0;

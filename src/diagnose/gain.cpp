@@ -233,6 +233,12 @@ const char *no_force_gain(const Problem &problem, const VectorXd &left, const Ve
 
 } // namespace
 
+double force_error_N(const Work &work)
+{
+	const Decision &d = work.decision;
+	return force_errors(work, d.given.ok ? d.given.hypothesis : d.base.hypothesis).rmse;
+}
+
 const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, std::vector<double> *per_cause,
 								std::vector<double> *per_cause_low, std::vector<double> *per_cause_high)
 {

@@ -265,6 +265,7 @@ void Gathered::prepare(Work &work)
 		work.output_unit[o] = suffix == std::string::npos ? "" : work.output_name[o].substr(suffix + 1);
 	}
 	work.problem = std::make_unique<Problem>(segments, use);
+	work.problem->thinned = work.every > 1;
 	const auto fatal = hopeless.find(work.channel);
 	work.hopeless = fatal != hopeless.end() ? fatal->second : hopeless.count(0) ? hopeless[0] : nullptr;
 	if (!work.hopeless && work.problem->rows() < 20)

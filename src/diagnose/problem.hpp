@@ -105,7 +105,7 @@ class Problem
 	int block_count = 0;
 	std::vector<char> test; /* per block: no choice sees it */
 	std::vector<int> fold;  /* per block that trains */
-	bool whole_recordings = false;
+	bool whole_recordings = false, thinned = false;
 	VectorXd measured; /* reading / scale of its output */
 	double scale[TACTUS_OUTPUTS_MAX] = {}, range[TACTUS_OUTPUTS_MAX] = {};
 	double input_range = 0;

@@ -114,6 +114,41 @@ std::string sentence(const Work &work, const tactus_effect *effect)
 		   quantity(rms * problem.scale[output], work.output_unit[output]) + " rms: " + ratio;
 }
 
+/* A parameter as it is now and as the model had it. */
+tactus_found_parameter against_given(Store &store, const Work &work, const Slot &slot)
+{
+	Hypothesis now = work.full.hypothesis, then = work.decision.given.hypothesis;
+	double error = NAN;
+	for (size_t j = 0; j < work.full.slots.size(); j++)
+		if (work.full.slots[j].part == slot.part && work.full.slots[j].index == slot.index)
+			error = work.errors[j];
+	return {slot.info->name, store.text(unit_of(work, slot.info->unit)), Problem::value(now, slot), error,
+			Problem::value(then, slot)};
+}
+
+std::string move_of(const tactus_found_parameter &p)
+{
+	char change[48] = "";
+	if (p.given != 0)
+		snprintf(change, sizeof change, " (%+.2g %%)", 100 * (p.value / p.given - 1));
+	return std::string(p.name) + " from " + quantity(p.given, p.unit) + " to " + quantity(p.value, p.unit) + change;
+}
+
+/* What else of the model as given no longer holds: plainly, or it is what the causes took from it. */
+const char *moved_beside(Store &store, const Work &work)
+{
+	const Decision &d = work.decision;
+	std::string words;
+	if (d.causes.empty() || !d.given.ok)
+		return nullptr;
+	for (const Slot &slot : work.problem->slots(d.given.hypothesis)) {
+		const tactus_found_parameter p = against_given(store, work, slot);
+		if (slot.part < 0 && std::abs(p.value - p.given) > std::fmax(3 * p.standard_error, 0.02 * std::abs(p.given)))
+			words += (words.empty() ? "" : ", ") + move_of(p);
+	}
+	return words.empty() ? nullptr : store.text(words);
+}
+
 tactus_cause stale_cause(Store &store, const Work &work)
 {
 	const Decision &d = work.decision;
@@ -122,19 +157,8 @@ tactus_cause stale_cause(Store &store, const Work &work)
 	std::vector<tactus_found_parameter> moved;
 	std::string words;
 	for (const Slot &slot : d.moved.slots) {
-		Hypothesis now = work.full.hypothesis, then = d.given.hypothesis;
-		double error = NAN;
-		for (size_t j = 0; j < work.full.slots.size(); j++)
-			if (work.full.slots[j].part == slot.part && work.full.slots[j].index == slot.index)
-				error = work.errors[j];
-		const double value = Problem::value(now, slot), given = Problem::value(then, slot);
-		moved.push_back({slot.info->name, store.text(unit_of(work, slot.info->unit)), value, error, given});
-		char change[48] = "";
-		if (given != 0)
-			snprintf(change, sizeof change, " (%+.2g %%)", 100 * (value / given - 1));
-		words += (words.empty() ? "" : ", ") + std::string(slot.info->name) + " from " +
-				 quantity(given, unit_of(work, slot.info->unit)) + " to " +
-				 quantity(value, unit_of(work, slot.info->unit)) + change;
+		moved.push_back(against_given(store, work, slot));
+		words += (words.empty() ? "" : ", ") + move_of(moved.back());
 	}
 	cause.parameter_count = moved.size();
 	cause.parameters = store.keep(std::move(moved));
@@ -411,6 +435,7 @@ std::string summary_of(const tactus_diagnosed &s)
 tactus_diagnosed report(Store &store, const Work &work, const char *device, uint64_t seed)
 {
 	tactus_diagnosed s{};
+	s.force_rmse_N = NAN;
 	s.channel = work.said_channel();
 	s.every = work.every;
 	if (work.hopeless || !work.decision.base.ok) {
@@ -425,6 +450,8 @@ tactus_diagnosed report(Store &store, const Work &work, const char *device, uint
 	s.left_out = work.outliers.size();
 	s.verdict = d.verdict;
 	s.base = base_errors(store, work, &s.base_count);
+	s.force_rmse_N = force_error_N(work);
+	s.moved = moved_beside(store, work);
 	s.wrong_count = d.wrong.size();
 	s.wrong = describe(store, work, d.wrong, d.base);
 	std::vector<double> gain, low, high;
