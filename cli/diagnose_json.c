@@ -169,11 +169,8 @@ static void json_series(struct cli_json *json, const tactus_diagnosed *series)
 	cli_json_object(json, NULL);
 	cli_json_number(json, "channel", series->channel ? (double)series->channel : (double)NAN);
 	cli_json_number(json, "samples", (double)series->samples);
-	cli_json_number(json, "every", (double)series->every);
 	cli_json_string(json, "verdict", tactus_verdict_name(series->verdict));
 	json_base(json, series);
-	cli_json_number(json, "force_rmse_N", series->force_rmse_N);
-	cli_json_string(json, "moved", series->moved);
 	json_dependences(json, "wrong", series->wrong, series->wrong_count, true);
 	cli_json_array(json, "causes");
 	for (size_t i = 0; i < series->cause_count; i++)
@@ -185,6 +182,9 @@ static void json_series(struct cli_json *json, const tactus_diagnosed *series)
 	json_gain(json, series->gain);
 	json_experiment(json, series->experiment);
 	json_candidates(json, series);
+	cli_json_number(json, "every", (double)series->every);
+	cli_json_number(json, "force_rmse_N", series->force_rmse_N);
+	cli_json_string(json, "moved", series->moved);
 	cli_json_close(json);
 }
 

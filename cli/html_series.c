@@ -8,7 +8,7 @@
 
 static void base_table(const struct html *html, const tactus_diagnosed *series, size_t s)
 {
-	char text[64], name[64];
+	char text[64], name[64], moved[512];
 	if (!series->base_count)
 		return;
 	html_element(html, "h3", "How far off the simulation is");
@@ -25,7 +25,18 @@ static void base_table(const struct html *html, const tactus_diagnosed *series, 
 		html_cell(html, cli_of_noise(base, text));
 		fputs("</tr>\n", html->out);
 	}
+	if (isfinite(series->force_rmse_N)) {
+		fputs("<tr>", html->out);
+		html_cell(html, "force estimate");
+		html_number(html, series->force_rmse_N, cli_si(series->force_rmse_N, "N", 3, text), ".series[%zu].force_rmse_N",
+					s);
+		fputs("<td></td><td></td><td></td></tr>\n", html->out);
+	}
 	html_table_end(html);
+	if (series->moved) {
+		snprintf(moved, sizeof moved, "Beside the causes the calibration no longer holds: %s.", series->moved);
+		html_element(html, "p", moved);
+	}
 	html_element(html, "p class=\"soft\"",
 				 "Root mean square of measured minus simulated: of the model as it was given, after its parameters "
 				 "were fitted to this recording, and of the noise that no smooth model can remove.");

@@ -57,6 +57,25 @@ MatrixXd times(const MatrixXd &columns, const VectorXd &x)
 	return columns.array().colwise() * x.array();
 }
 
+/* The time since a recording began, cut into equal stretches. */
+MatrixXd stretches(const Problem &problem)
+{
+	const Index parts = 40;
+	MatrixXd columns = MatrixXd::Zero(problem.rows(), parts);
+	double longest = 0;
+	for (const tactus_series *series : problem.segments)
+		longest = std::fmax(longest, tactus_series_duration_s(series));
+	for (const Run &run : problem.runs) {
+		const double *time = tactus_series_clock(problem.segments[run.segment]);
+		for (Index i = run.first; longest > 0 && i < run.first + run.count; i++) {
+			const double share = (time[problem.sample[size_t(i)]] - time[0]) / longest;
+			if (share >= 0 && share <= 1)
+				columns(i, std::min(parts - 1, Index(share * double(parts)))) = 1;
+		}
+	}
+	return columns;
+}
+
 /* x² z and x³ z, both about their means: what neither a curve of the one nor a coefficient of the other is. */
 MatrixXd crossed(const VectorXd &z, const VectorXd &x)
 {
@@ -242,6 +261,10 @@ std::vector<Group> groups_of(const Problem &problem, const std::vector<Extra> &e
 	}
 	if (ordered && inputs > 1)
 		collect.add("row order", "level", row_before(problem), row_before(problem));
+	/* What comes again at the same times of every recording, in jumps too: an operator's habit, something nearby. */
+	const size_t time = tactus_role_signal(domain, TACTUS_ROLE_TIME);
+	if (problem.segments.size() > 1 && problem.segments.front()->has_clock)
+		collect.add(domain->signals[time].name, "stretch", stretches(problem), problem.at_rows(time));
 	/* What was put together anew between recordings: nobody wrote a column of it. */
 	const Index recordings = Index(problem.segments.size());
 	if (recordings > 1 && recordings <= 40) {

@@ -120,6 +120,35 @@ std::string unit_in_name(const std::string &column)
 	return at == std::string::npos ? "" : column.substr(at + 1);
 }
 
+/* True if every recording begins at about the same time of its clock. */
+bool same_times(const Problem &problem)
+{
+	const tactus_series *first = problem.segments.front();
+	return std::all_of(problem.segments.begin(), problem.segments.end(), [&](const tactus_series *s) {
+		return std::abs(tactus_series_clock(s)[0] - tactus_series_clock(first)[0]) <
+			   0.1 * tactus_series_duration_s(first);
+	});
+}
+
+/* True if the recordings went through the same loads at the same times since they began. */
+bool same_loads(const Problem &problem)
+{
+	const tactus_series *first = problem.segments.front();
+	const int instants = 100;
+	double square = 0, count = 0;
+	for (const tactus_series *s : problem.segments)
+		for (int k = 0; k < instants; k++) {
+			const double t = k * tactus_series_duration_s(first) / instants;
+			const double load = tactus_series_load_at(s, tactus_series_clock(s)[0] + t),
+						 expected = tactus_series_load_at(first, tactus_series_clock(first)[0] + t);
+			if (std::isfinite(load - expected)) {
+				square += (load - expected) * (load - expected);
+				count++;
+			}
+		}
+	return count > 0 && std::sqrt(square / count) < 0.1 * problem.input_range;
+}
+
 } // namespace
 
 const tactus_dependence *describe(Store &store, const Work &work, const std::vector<Dependence> &list, const Fit &fit)
@@ -183,8 +212,12 @@ const tactus_dependence *describe(Store &store, const Work &work, const std::vec
 			text = store.format("%s: something changed between them that no column records", text);
 		else if (group.unknown)
 			text = store.format("%s (a column that no cause of the catalogue knows)", text);
-		else if (problem.segments.size() > 1 && name == "time_s")
-			text = store.format("%s, at the same times in every recording: an unrecorded cause", text);
+		else if (problem.segments.size() > 1 && name == "time_s" && (group.aspect == "stretch" || same_times(problem)))
+			text =
+				store.format(same_loads(problem) ? "%s, at the same times and loads in every recording: an unrecorded "
+												   "cause, or what the loads did before"
+												 : "%s, at the same times in every recording: an unrecorded cause",
+							 text);
 		result.push_back({store.text(name), dep.explained, dep.p_value, text});
 	}
 	return store.keep(std::move(result));

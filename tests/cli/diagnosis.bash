@@ -12,7 +12,7 @@ contract() {
 		(all(.problems[]; keys_unsorted == ["kind","text","rows"])) and
 		(all(.series[];
 			(keys_unsorted == ["channel","samples","verdict","base","wrong","causes","structure_remains","unexplained",
-				"not_testable","gain","next_experiment","candidates"]) and
+				"not_testable","gain","next_experiment","candidates","every","force_rmse_N","moved"]) and
 			(all(.base[]; keys_unsorted == ["output","unit","rmse","refit_rmse","noise_floor"])) and
 			(all(.wrong[]; keys_unsorted == ["covariate","explained","p_value","text"])) and
 			(all(.causes[];

@@ -125,7 +125,7 @@ measure() {
 			def numbers(value, path):
 			    if isinstance(value, dict):
 			        for k, v in value.items():
-			            if k not in ("channel", "samples", "problems", "unit"):
+			            if k not in ("channel", "samples", "every", "problems", "unit"):
 			                yield from numbers(v, f"{path}.{k}")
 			    elif isinstance(value, list):
 			        for i, v in enumerate(value):
