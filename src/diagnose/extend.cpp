@@ -89,6 +89,13 @@ void extend(const Work &work, const std::vector<const tactus_effect *> &effects,
 	if (!data)
 		return;
 	fill(work, work.full.hypothesis, effects, data);
+	/* What it leaves, not the noise alone: where something unexplained is left, a force is as uncertain as that. */
+	VectorXd y;
+	const Problem &problem = *work.problem;
+	if (problem.simulate(work.full.hypothesis, y))
+		for (size_t o = 0; o < problem.output_count; o++)
+			if (problem.outputs[o])
+				data->residual_std[o] = problem.scale[o] * rms_of(problem, o, problem.measured - y);
 	for (size_t j = 0; j < work.full.slots.size(); j++) {
 		const Slot &slot = work.full.slots[j];
 		if (slot.part < 0) {

@@ -9,9 +9,6 @@
 namespace tactus::explain
 {
 
-namespace
-{
-
 double rms_of(const Problem &problem, size_t output, const VectorXd &x)
 {
 	double square = 0, count = 0;
@@ -23,6 +20,9 @@ double rms_of(const Problem &problem, size_t output, const VectorXd &x)
 			}
 	return count > 0 ? std::sqrt(square / count) : NAN;
 }
+
+namespace
+{
 
 const tactus_base_error *base_errors(Store &store, const Work &work, size_t *count)
 {

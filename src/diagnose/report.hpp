@@ -81,6 +81,8 @@ std::string quantity(double value, const std::string &unit);
 
 const tactus_dependence *describe(Store &store, const Work &work, const std::vector<Dependence> &list, const Fit &fit);
 const char *swing_in_words(Store &store, const Work &work, const Swing &swing);
+/* Root mean square of a stack over an output's readings that are no outliers. */
+double rms_of(const Problem &problem, size_t output, const VectorXd &x);
 /* How far the model as given (refitted, where none is) is off in newtons, on held-out data; NaN: no force. */
 double force_error_N(const Work &work);
 const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, std::vector<double> *per_cause,
