@@ -87,11 +87,36 @@ std::string capital(std::string s)
 	return s;
 }
 
+/* Of an effect that no prediction shows, what it adds to the noise: "it adds 44 µV rms to amplitude_V: 0.81 times …".
+ */
+std::string imprint_of(const Work &work, const tactus_effect *effect)
+{
+	const Problem &problem = *work.problem;
+	double variance[TACTUS_OUTPUTS_MAX] = {};
+	Part part = problem.neutral(effect);
+	if (!effect->imprint || !(effect->imprint(problem.segments.front(), part.value.data(), variance) > 0))
+		return "";
+	std::string words;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const double rms = std::sqrt(variance[o]);
+		if (!problem.outputs[o] || !(rms > 0))
+			continue;
+		char ratio[64];
+		snprintf(ratio, sizeof ratio, ", %.2g times the noise floor", rms / (problem.floor(o) * problem.scale[o]));
+		words += (words.empty() ? "its steps add " : " and ") + quantity(rms, work.output_unit[o]) + " rms to " +
+				 work.output_name[o] + ratio;
+	}
+	return words;
+}
+
 /* "creep: the film gives way …; here it moves conductance_S by 12 nS (rms), 4.1 times the noise". */
 std::string sentence(const Work &work, const tactus_effect *effect)
 {
 	const Problem &problem = *work.problem;
 	const VectorXd moved = contribution(work, effect);
+	const std::string added = imprint_of(work, effect);
+	if (!added.empty())
+		return std::string(effect->summary) + "; here " + added;
 	size_t output = 0;
 	double most = -1;
 	for (size_t o = 0; o < problem.output_count; o++)
@@ -389,6 +414,15 @@ std::string names(const std::vector<std::string> &list, const char *last)
 	return text;
 }
 
+/* The causes after the first. */
+std::string beside(const tactus_diagnosed &s)
+{
+	std::vector<std::string> list;
+	for (size_t i = 1; i < s.cause_count; i++)
+		list.push_back(s.causes[i].effect);
+	return list.empty() ? "" : "; beside that " + names(list, "and");
+}
+
 std::string summary_of(const tactus_diagnosed &s)
 {
 	char buffer[256];
@@ -414,7 +448,7 @@ std::string summary_of(const tactus_diagnosed &s)
 		list.push_back(s.causes[0].effect);
 		for (size_t i = 0; i < s.causes[0].inseparable; i++)
 			list.push_back(s.causes[0].rivals[i].effect);
-		return capital(names(list, "or")) + ": this recording cannot tell them apart" + gain;
+		return capital(names(list, "or")) + ": this recording cannot tell them apart" + beside(s) + gain;
 	case TACTUS_VERDICT_STALE_CALIBRATION:
 		for (size_t i = 0; i < s.causes[0].parameter_count; i++)
 			list.push_back(s.causes[0].parameters[i].name);

@@ -342,3 +342,116 @@ left_over() {
 	tactus diagnose bursts.csv --json >said.json
 	jq -e '.verdict == "unexplained" and any(.series[0].unexplained[].text; test("comes in bursts"))' said.json
 }
+
+@test "the mains is found wherever its frequency lies, and named with it" {
+	for hz in 49.97 50.013 59.96; do
+		computed time_s,force_N,conductance_S t,f,g <<-EOP >hum.csv
+			t = np.arange(6000) / 200
+			f = 40 + 40 * np.sin(0.4 * t)
+			g = 2e-6 + 3e-7 * f + 3e-7 * np.sin(2 * np.pi * $hz * t + 1) + 4e-8 * np.random.default_rng(3).normal(size=t.size)
+		EOP
+		tactus diagnose hum.csv --json >said.json
+		jq -e --argjson hz $hz '.series[0] | [.causes[].effect] == ["mains-hum"] and .structure_remains == false and
+			any(.causes[0].parameters[]; .name == "mains_Hz" and (.value - $hz | fabs) < 4 * .standard_error and
+				.standard_error < 0.003) and .gain.reduction > 0.75' said.json || fail "$hz Hz: $(cat said.json)"
+	done
+}
+
+@test "a slow wave sampled in step with the mains is no mains" {
+	computed time_s,force_N,conductance_S t,f,g <<-'EOP' >wave.csv
+		t = np.arange(7500) / 50
+		f = 40 + 40 * np.sin(0.4 * t)
+		g = 2e-6 + 3e-7 * f + 6e-7 * np.sin(2 * np.pi * t / 19) + 4e-8 * np.random.default_rng(4).normal(size=t.size)
+	EOP
+	tactus diagnose wave.csv --json | jq -e '.verdict == "unexplained"'
+}
+
+@test "a conductance that the drive changes, what it leaks without a load too, is no friction beside" {
+	for seed in 1 2; do
+		computed time_s,force_N,conductance_S,drive_V t,f,g,v <<-EOP >drive.csv
+			rng = np.random.default_rng($seed)
+			t = np.arange(6000) / 50
+			f = 80 * np.abs(2 * (t / 11 % 1) - 1)
+			v = np.array([1, 2, 3, 1.5])[(t / 7).astype(int) % 4]
+			g = (2e-6 + 3e-7 * f) * (1 + 0.03 * (v ** 2 - 1)) + 5e-8 * rng.normal(size=t.size)
+		EOP
+		tactus diagnose drive.csv --json >said.json
+		jq -e '[.series[0].causes[].effect] == ["voltage-dependence"]' said.json || fail "$seed: $(cat said.json)"
+	done
+}
+
+@test "a model of one output is judged by that output" {
+	computed time_s,force_N,conductance_S,capacitance_F t,f,g,c <<-'EOP' >both.csv
+		rng = np.random.default_rng(6)
+		t = np.arange(3000) / 50
+		f = 80 * np.abs(2 * (t / 11 % 1) - 1)
+		g = 2e-6 + 3e-7 * f + 3e-8 * rng.normal(size=t.size)
+		c = 8e-12 + 4e-13 * f + 6e-14 * rng.normal(size=t.size)
+	EOP
+	tactus fit both.csv --model conductance -o one.toml >fitted.txt
+	tactus diagnose both.csv -m one.toml --json | jq -e '.verdict == "nothing-wrong" and .series[0].force_rmse_N < 0.2'
+	awk -F, -v OFS=, 'NR == 1 || $3 *= 1.08' both.csv >moved.csv
+	tactus diagnose moved.csv -m one.toml --json >said.json
+	jq -e '.verdict == "stale-calibration" and [.series[0].causes[0].parameters[].name] - ["g0", "g1"] == []' said.json
+}
+
+@test "a cause beside a stale calibration: the headline is the model as given, and what moved is said" {
+	computed time_s,force_N,conductance_S t,f,g <<-'EOP' >creeps.csv
+		t = np.arange(6000) / 50
+		f = np.array([0, 60, 0, 90, 10, 50])[(t / 20).astype(int)]
+		s = np.zeros(t.size)
+		for k in range(1, t.size):
+		    s[k] = s[k - 1] + (f[k] - s[k - 1]) * 0.02 / 8
+		g = 2e-6 + 3.3e-7 * (f + 0.08 * s) + 3e-8 * np.random.default_rng(8).normal(size=t.size)
+	EOP
+	cat >old.toml <<-'EOM'
+		kind = "model"
+		format = 1
+		domain = "sensor"
+		form = "forward"
+		[output.conductance_S]
+		[[channel]]
+		channel = 1
+		[channel.base]
+		g0 = 2e-6
+		g1 = 3e-7
+		[channel.reading.conductance_S]
+		residual_std = 3e-8
+	EOM
+	tactus diagnose creeps.csv -m old.toml --json >said.json
+	jq -e '.series[0] | .causes[0].effect == "creep" and (.moved | test("g1 from .*%")) and
+		.force_rmse_N > 3 * .gain.force_rmse_before_N' said.json
+	tactus diagnose creeps.csv -m old.toml >page.txt
+	grep -q '^Moved  *beside that the calibration no longer holds: ' page.txt
+}
+
+@test "an offset that comes again at the same times of every recording is an unrecorded cause" {
+	for k in 1 2 3; do
+		computed time_s,force_N,conductance_S t,f,g <<-EOP >again$k.csv
+			rng = np.random.default_rng($k)
+			t = np.arange(4800) / 40
+			f = 80 * np.abs(2 * (t / (7 + $k) % 1) - 1)
+			place = np.random.default_rng(99).normal(size=16)[(t / 7.5).astype(int)]
+			g = 2e-6 + 3e-7 * f + 3e-7 * place + 4e-8 * rng.normal(size=t.size)
+		EOP
+	done
+	tactus diagnose again1.csv again2.csv again3.csv --json >said.json
+	jq -e '.verdict == "unexplained" and .series[0].unexplained[0].covariate == "time_s" and
+		(.series[0].unexplained[0].text | test("at the same times in every recording: an unrecorded cause$"))' said.json
+}
+
+@test "a thinned recording says so, and a lag in it is no time offset beside" {
+	computed time_s,force_N,conductance_S t,f,g <<-'EOP' >long.csv
+		t = np.arange(100000) / 500
+		f = 40 + 30 * np.sin(2 * t) + 8 * np.sin(17 * t)
+		a = 1 - np.exp(-0.0002 / 0.03)
+		fine = np.repeat(f, 10)
+		from scipy.signal import lfilter
+		lagged = lfilter([a], [1, a - 1], fine - fine[0])[9::10] + fine[0]
+		g = 2e-6 + 3e-7 * lagged + 4e-8 * np.random.default_rng(9).normal(size=t.size)
+	EOP
+	tactus diagnose long.csv --json >said.json
+	jq -e '.series[0] | .every > 1 and .causes[0].effect == "lag" and .causes[1] == null' said.json
+	tactus diagnose long.csv >page.txt
+	grep -qE 'every [0-9]+-th' page.txt
+}

@@ -170,6 +170,7 @@ static void voltage_dependence_is_that_of_the_fundamental_in_ac(void **unused)
 	double p[TACTUS_PARAMETERS_MAX], k = 0.01, v0 = 2;
 	rig_neutral(effect, p);
 	rig_set(effect, p, "coefficient_per_V2", k);
+	rig_set(effect, p, "offset_S_per_V2", 1e-9);
 	rig_set(effect, p, "reference_V", v0);
 	rig_recording rig = through_chain(effect, p);
 	for (size_t i = 0; i < N; i++) {
@@ -182,7 +183,7 @@ static void voltage_dependence_is_that_of_the_fundamental_in_ac(void **unused)
 		} else {
 			gain = 1 + k * (v * v - v0 * v0);
 		}
-		expect(&rig, i, 0, gain, 0, 1);
+		expect(&rig, i, 1e-9 * (gain - 1) / k, gain, 0, 1);
 	}
 	rig_free(&rig);
 }

@@ -1,24 +1,28 @@
 /* voltage-dependence: the film's conductance depends on the voltage across it. */
 #include "model/effects/effect_util.h"
 
-enum { COEFFICIENT, REFERENCE };
+enum { COEFFICIENT, OFFSET, REFERENCE };
 
 static const tactus_parameter parameters[] = {
-	{"coefficient_per_V2", "1/V2", "relative growth of the conductance per volt squared", 0, -10, 10, 0.005, 0.002,
+	{"coefficient_per_V2", "1/V2", "relative growth of the sensitivity per volt squared", 0, -10, 10, 0.005, 0.002,
 	 TACTUS_STRENGTH, 0},
+	{"offset_S_per_V2", "output0/V2", "growth of the conductance at no load per volt squared", 0, -1e9, 1e9, 0.005,
+	 0.002, TACTUS_STRENGTH, 0},
 	{"reference_V", "V", "voltage V0 at which it changes nothing, in dc", 1, 0, 1e6, 1, 1, TACTUS_CONSTANT, -1},
 };
 
 /*
  * i = G (1 + k (v² − V0²)) v. In ac, v = V sin ωt and sin³ has a fundamental of ¾: gain 1 + k (¾ V² − V0²), so that one
- * film has one k and one V0 in both modes.
+ * film has one k and one V0 in both modes. What conducts without a load has a growth of its own: it may be a leak.
  */
 static void process(const double *p, double *state, size_t n, double *const *signal)
 {
 	(void)state;
 	for (size_t i = 0; i < n; i++) {
 		double v = signal[SENSOR_DRIVE][i], share = signal[SENSOR_FREQUENCY][i] > 0 ? 0.75 : 1;
-		signal[SENSOR_GAIN_G][i] *= 1 + p[COEFFICIENT] * (share * v * v - p[REFERENCE] * p[REFERENCE]);
+		double more = share * v * v - p[REFERENCE] * p[REFERENCE];
+		signal[SENSOR_GAIN_G][i] *= 1 + p[COEFFICIENT] * more;
+		signal[SENSOR_OFFSET_G][i] += p[OFFSET] * more;
 	}
 }
 
