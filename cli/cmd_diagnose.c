@@ -38,13 +38,19 @@ static bool about_output(const char *option)
 	return false;
 }
 
+static bool piped(const char *recording)
+{
+	return !recording || strcmp(recording, "-") == 0;
+}
+
+/* What came through a pipe is gone: to be diagnosed again it has to be kept in a file. */
 static void print_command(FILE *out, const struct cli *cli, bool outputs)
 {
 	fputs("tactus diagnose", out);
 	for (size_t i = 0; !i || cli_argument(cli, i); i++) {
 		const char *recording = cli_argument(cli, i);
 		fputc(' ', out);
-		quote(out, recording ? recording : "-");
+		quote(out, !piped(recording) ? recording : outputs ? "-" : "run.csv");
 	}
 	for (const struct cli_option *o = cli_diagnose.options; o->name; o++) {
 		bool repeats = outputs ? strcmp(o->name, "overwrite") != 0 : !about_output(o->name);
@@ -118,7 +124,7 @@ static int write_page(const struct cli *cli, const tactus_diagnosis *diagnosis, 
 	if (cli_has(cli, "json"))
 		cli_diagnose_json(output.stream, diagnosis, extended);
 	else
-		cli_diagnose_text(output.stream, cli, diagnosis);
+		cli_diagnose_text(output.stream, cli, diagnosis, extended);
 	return cli_output_close(cli, &output);
 }
 

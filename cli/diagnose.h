@@ -9,7 +9,8 @@ extern const struct cli_command cli_diagnose;
 /* CONTRACT §4, on out; `extended` is the path of the extended model, NULL where none was written. */
 void cli_diagnose_json(FILE *out, const tactus_diagnosis *diagnosis, const char *extended);
 /* The page of about a dozen lines. */
-void cli_diagnose_text(FILE *out, const struct cli *cli, const tactus_diagnosis *diagnosis);
+/* extended: the file that holds the extended model, or NULL. */
+void cli_diagnose_text(FILE *out, const struct cli *cli, const tactus_diagnosis *diagnosis, const char *extended);
 /* Writes index.html into the directory, which is made if it is not there; `first` is the first recording. A status. */
 int cli_diagnose_report(const struct cli *cli, const tactus_diagnosis *diagnosis, const tactus_table *first,
 						const char *directory);

@@ -328,7 +328,9 @@ static void command_line(const struct page *page, const char *command)
 
 static void again_with(const struct page *page, const char *why, const char *extra)
 {
-	page_item(page, "Next", "%s", why);
+	const char *recording = cli_argument(page->cli, 0);
+	bool piped = !recording || strcmp(recording, "-") == 0;
+	page_item(page, "Next", "%s%s", piped ? "with the recording kept in a file (… | tee run.csv | …), " : "", why);
 	page_emphasis(page, "\033[1m");
 	fputs("  ", page->out);
 	cli_diagnose_command(page->out, page->cli, extra);
@@ -339,7 +341,7 @@ static void again_with(const struct page *page, const char *why, const char *ext
 static void say_next(const struct page *page)
 {
 	const tactus_experiment *experiment = first_experiment(page->diagnosis);
-	const char *extended = cli_string(page->cli, "extended", NULL), *report = cli_string(page->cli, "report", NULL);
+	const char *extended = page->extended, *report = cli_string(page->cli, "report", NULL);
 	enum tactus_verdict verdict = page->diagnosis->verdict;
 	bool extends = verdict == TACTUS_VERDICT_CAUSE_FOUND || verdict == TACTUS_VERDICT_STALE_CALIBRATION;
 	if (experiment) {
@@ -441,9 +443,9 @@ static void page_several(const struct page *page)
 	say_next(page);
 }
 
-void cli_diagnose_text(FILE *out, const struct cli *cli, const tactus_diagnosis *diagnosis)
+void cli_diagnose_text(FILE *out, const struct cli *cli, const tactus_diagnosis *diagnosis, const char *extended)
 {
-	struct page page = {out, cli, diagnosis, cli_colour(out)};
+	struct page page = {out, cli, diagnosis, extended, cli_colour(out)};
 	say_problems(&page);
 	if (diagnosis->series_count > 1) {
 		page_several(&page);

@@ -8,6 +8,7 @@ struct page {
 	FILE *out;
 	const struct cli *cli;
 	const tactus_diagnosis *diagnosis;
+	const char *extended; /* the file that holds the extended model, or NULL */
 	bool coloured;
 };
 

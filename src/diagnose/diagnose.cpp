@@ -118,6 +118,61 @@ void Diagnosis::hold_stated(Work &work, Hypothesis &base) const
 	}
 }
 
+namespace
+{
+
+/* Standard errors of a fit's parameters; NaN where one stands at a bound or moves nothing. */
+std::vector<double> standard_errors(const Problem &problem, const Fit &fit)
+{
+	const MatrixXd &j = fit.jacobian;
+	std::vector<double> errors;
+	if (j.cols() == 0)
+		return errors;
+	MatrixXd masked = j;
+	for (Index k = 0; k < j.cols(); k++) {
+		VectorXd c = j.col(k);
+		problem.mask(c, Rows::all);
+		masked.col(k) = c;
+	}
+	VectorXd size = masked.colwise().norm();
+	for (Index k = 0; k < size.size(); k++) {
+		size[k] = size[k] > 0 ? size[k] : 1;
+		masked.col(k) /= size[k];
+	}
+	const Eigen::CompleteOrthogonalDecomposition<MatrixXd> normal(masked.transpose() * masked);
+	const MatrixXd covariance = normal.pseudoInverse();
+	const double variance = fit.square / std::fmax(double(problem.rows() - j.cols()), 1);
+	const MatrixXd disagreement = covariance * problem.scatter(masked, fit.residual) * covariance;
+	for (Index k = 0; k < j.cols(); k++) {
+		Hypothesis at = fit.hypothesis;
+		const Slot &slot = fit.slots[size_t(k)];
+		const double v = Problem::value(at, slot);
+		const bool known = masked.col(k).norm() > 0 && v > slot.info->lower && v < slot.info->upper;
+		const double square = std::fmax(covariance(k, k) * variance, disagreement(k, k));
+		errors.push_back(known ? std::sqrt(std::fmax(square, 0)) / size[k] : NAN);
+	}
+	return errors;
+}
+
+/* Takes out what a memory began with where it is no larger than its error; true if there was any. */
+bool drop_undetermined(const Fit &fit, const std::vector<double> &errors, Hypothesis &h)
+{
+	bool any = false;
+	for (size_t k = 0; k < fit.slots.size(); k++) {
+		const Slot &slot = fit.slots[k];
+		if (slot.part < 0 || slot.info->kind != TACTUS_INITIAL ||
+			std::abs(Problem::value(h, slot) - slot.info->neutral) > errors[k])
+			continue;
+		Part &part = h.parts[size_t(slot.part)];
+		part.value[slot.index] = slot.info->neutral;
+		part.free.erase(std::remove(part.free.begin(), part.free.end(), slot.index), part.free.end());
+		any = true;
+	}
+	return any;
+}
+
+} // namespace
+
 void Diagnosis::explain(Work &work)
 {
 	if (work.hopeless)
@@ -208,31 +263,15 @@ void Diagnosis::explain(Work &work)
 	if (!work.full.ok)
 		work.full = problem.evaluate(h, Rows::all);
 	work.full.hypothesis = problem.levelled(work.full.hypothesis, Rows::all);
-	const MatrixXd &j = work.full.jacobian;
-	if (j.cols() == 0)
-		return;
-	MatrixXd masked = j;
-	for (Index k = 0; k < j.cols(); k++) {
-		VectorXd c = j.col(k);
-		problem.mask(c, Rows::all);
-		masked.col(k) = c;
-	}
-	VectorXd size = masked.colwise().norm();
-	for (Index k = 0; k < size.size(); k++) {
-		size[k] = size[k] > 0 ? size[k] : 1;
-		masked.col(k) /= size[k];
-	}
-	const Eigen::CompleteOrthogonalDecomposition<MatrixXd> normal(masked.transpose() * masked);
-	const MatrixXd covariance = normal.pseudoInverse();
-	const double variance = work.full.square / std::fmax(double(problem.rows() - j.cols()), 1);
-	const MatrixXd disagreement = covariance * problem.scatter(masked, work.full.residual) * covariance;
-	for (Index k = 0; k < j.cols(); k++) {
-		Hypothesis at = work.full.hypothesis;
-		const Slot &slot = work.full.slots[size_t(k)];
-		const double v = Problem::value(at, slot);
-		const bool known = masked.col(k).norm() > 0 && v > slot.info->lower && v < slot.info->upper;
-		const double square = std::fmax(covariance(k, k) * variance, disagreement(k, k));
-		work.errors.push_back(known ? std::sqrt(std::fmax(square, 0)) / size[k] : NAN);
+	work.errors = standard_errors(problem, work.full);
+	/* Where the order of the memory's past cannot be read off, it is neutral: numbers without a meaning are none. */
+	if (drop_undetermined(work.full, work.errors, h = work.full.hypothesis)) {
+		const Fit fit = problem.fit(h, Rows::all);
+		if (fit.ok) {
+			work.full = fit;
+			work.full.hypothesis = problem.levelled(fit.hypothesis, Rows::all);
+			work.errors = standard_errors(problem, work.full);
+		}
 	}
 	/* An autoregression takes a swing for noise, and of what stands at the edge of a line it makes any size. */
 	for (size_t o = 0; o < problem.output_count; o++)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <set>
 
 #include "core/core.h"
 #include "diagnose/report.hpp"
@@ -215,7 +216,7 @@ double load_moves(const Problem &problem)
 
 /* Why newtons gain nothing while readings are simulated better; NULL where they do. */
 const char *no_force_gain(const Problem &problem, const VectorXd &left, const VectorXd &before,
-						  const ForceErrors &force_left, const ForceErrors &force_before)
+						  const ForceErrors &force_left, const ForceErrors &force_before, bool memory)
 {
 	if (!(force_left.rmse > 0.98 * force_before.rmse))
 		return nullptr;
@@ -227,8 +228,25 @@ const char *no_force_gain(const Problem &problem, const VectorXd &left, const Ve
 			return "a force is estimated from both readings, and the other one is as far off as before";
 	if (force_left.quick > 0.7 * force_left.rmse)
 		return "the extended model answers less to the load, and its inverse amplifies the noise of the readings";
+	if (!memory)
+		return "where a curve is flat or bends, a small error of the reading is a large one of the force";
 	return "read backwards, sample by sample, the model goes by its own earlier estimates and does not know what will "
 		   "come";
+}
+
+size_t held_out_recordings(const Problem &problem)
+{
+	std::set<size_t> segments;
+	for (const Run &run : problem.runs)
+		for (Index i = run.first; i < run.first + run.count; i++)
+			if (problem.block[size_t(i)] >= 0 && problem.test[size_t(problem.block[size_t(i)])])
+				segments.insert(run.segment);
+	return segments.size();
+}
+
+bool has_memory(const Hypothesis &h)
+{
+	return std::any_of(h.parts.begin(), h.parts.end(), [](const Part &part) { return part.effect->state_size > 0; });
 }
 
 } // namespace
@@ -270,8 +288,10 @@ const tactus_gain *measure_gain(Store &store, const Work &work, uint64_t seed, s
 	const ForceErrors force_before = force_errors(work, old), force_after = force_errors(work, next);
 	gain.force_rmse_before_N = force_before.rmse;
 	gain.force_rmse_after_N = force_after.rmse;
-	gain.no_force_gain = no_force_gain(problem, after, before, force_after, force_before);
+	gain.no_force_gain = no_force_gain(problem, after, before, force_after, force_before, has_memory(next));
 	gain.blocks = size_t(std::count_if(b.count.begin(), b.count.end(), [](double c) { return c > 0; }));
+	if (problem.whole_recordings) /* several blocks each */
+		gain.blocks = held_out_recordings(problem);
 	gain.held_out = problem.whole_recordings ? "recordings" : "stretches";
 	for (const Cause &cause : d.causes) {
 		VectorXd without;

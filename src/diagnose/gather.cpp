@@ -260,7 +260,10 @@ void Gathered::prepare(Work &work)
 	const tactus_series *first = segments.front();
 	work.input_name = first->input_name ? first->input_name : "";
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
-		work.output_name[o] = first->output_name[o] ? first->output_name[o] : "";
+		work.output_name[o] = "";
+		for (const tactus_series *series : segments)
+			if (work.output_name[o].empty() && series->output_name[o])
+				work.output_name[o] = series->output_name[o];
 		const size_t suffix = work.output_name[o].rfind('_');
 		work.output_unit[o] = suffix == std::string::npos ? "" : work.output_name[o].substr(suffix + 1);
 	}

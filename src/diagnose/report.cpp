@@ -492,7 +492,7 @@ tactus_diagnosed report(Store &store, const Work &work, const char *device, uint
 	s.gain = measure_gain(store, work, seed, &gain, &low, &high);
 	s.causes = causes_of(store, work, gain, low, high, &s.cause_count);
 	const bool harm = std::any_of(low.begin(), low.end(), [](double l) { return l < 0; });
-	s.structure_remains = !d.causes.empty() && (d.structure || harm);
+	s.structure_remains = d.structure || (!d.causes.empty() && harm);
 	s.unexplained = unexplained(store, work, low, high, &s.unexplained_count);
 	s.candidates = candidates_of(store, work, &s.candidate_count);
 	s.experiment = propose(store, work, device);
