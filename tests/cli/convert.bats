@@ -275,3 +275,27 @@ check_scan() { # FILE TOLERANCE
 	run -2 --separate-stderr tactus convert plan.csv -w csv
 	says --dwell
 }
+
+@test "waveform: several channels are never mixed, and what the samples say is not stated beside them" {
+	waveform
+	options="-w csv -o out.csv"
+	run -2 --separate-stderr tactus convert w.csv $options --channels 4,2,7
+	says --dwell
+	run -3 --separate-stderr tactus convert w.csv $options --channels 4,2,7 --dwell 1s
+	says "w.csv: the samples end within the first dwell of 1 s"
+	[ ! -e out.csv ] || fail "one reading of three loads"
+	run -0 --separate-stderr tactus convert w.csv $options --channels 4,2,7 --dwell 30ms
+	run -0 --separate-stderr tactus convert w.csv $options --overwrite --channels 1-4 --dwell 30ms
+	says "after 3 of its 4 readings"
+	awk -F, '/^#/ { next } { print $0 "," (header++ ? $1 < 10.04 ? 1 : 2 : "channel") }' w.csv >by-channel.csv
+	run -0 --separate-stderr tactus convert by-channel.csv $options --overwrite -g 1800 --frequency 4kHz --channels 1,2
+	[ "$(column channel <out.csv | tr '\n' ' ')" = "1 2 " ] || fail "the channel column says where a reading ends"
+	for stated in --drive=1V --drive-phase=1 --dc-drive=1V; do
+		run -2 --separate-stderr tactus convert w.csv -w csv $stated
+		says "${stated%=*}: the drive is sampled"
+	done
+	for rate in 0 -1; do
+		run -2 --separate-stderr tactus convert w.csv -w csv --sample-rate=$rate
+		says "($rate Hz) must be above 0"
+	done
+}
