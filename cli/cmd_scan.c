@@ -6,7 +6,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "newtons.h"
 #include "operator.h"
 #include "tare.h"
 
@@ -21,6 +21,7 @@ struct scan {
 	tactus_converter *converter;
 	tactus_model *model;
 	tactus_estimator *estimator;
+	struct cli_newtons newtons;
 	tactus_writer *writer;
 	double after_s; /* --append: added to times and sequence numbers */
 	uint64_t after_scans;
@@ -188,6 +189,7 @@ static int build(struct scan *scan)
 		error = tactus_converter_new(scan->table, NULL, &scan->converter);
 	if (error || !scan->model)
 		return error;
+	scan->newtons.model = scan->model;
 	tactus_model_fingerprint(scan->model, fingerprint);
 	error = tactus_metadata_set(tactus_table_metadata(scan->table), "model", fingerprint);
 	if (!error)
@@ -234,6 +236,8 @@ static int put(struct scan *scan, tactus_reading *readings, size_t n, bool first
 		error = tactus_converter_block(scan->converter, scan->table);
 	if (!error && scan->estimator)
 		error = tactus_estimator_block(scan->estimator, scan->table);
+	if (!error && scan->estimator)
+		cli_newtons_see(&scan->newtons, scan->table);
 	if (!error && first_second)
 		error = cli_tare_find(&scan->tare, scan->table, readings, n);
 	if (!error)
@@ -405,6 +409,8 @@ static int run_started(struct scan *scan, double share)
 		error = acquire(scan);
 	int status = cli_fail(scan->cli, error);
 	say_faults(scan);
+	if (!error && scan->estimator)
+		cli_newtons_note(scan->cli, &scan->newtons);
 	const int stopped = tactus_device_stop(scan->device);
 	const int closed = tactus_writer_close(scan->writer);
 	if (!error)

@@ -74,6 +74,27 @@ plain_model() {
 	[ "$(wc -l <newtons.csv)" -ge 7 ]
 }
 
+@test "force: a recording of which no reading becomes a force is said to lack what the model needs" {
+	tactus scan sim: --mode ac --count 2 -o ac.csv
+	tactus scan sim: --mode dc --count 2 -o dc.csv
+	run -0 --separate-stderr tactus force -m "$examples/model-weighted.toml" ac.csv
+	says "needs conductance_S of dc rows and capacitance_F of ac rows"
+	says "there is no conductance_S of dc rows"
+	run -0 --separate-stderr tactus force -m "$examples/model-weighted.toml" dc.csv
+	says "there is no capacitance_F of ac rows"
+	run -0 --separate-stderr tactus force -m "$examples/model-weighted.toml" "$examples/recording-readout.csv"
+	says "no reading became a force"
+	run -0 --separate-stderr tactus scan sim: --mode ac --count 2 -m "$examples/model-weighted.toml"
+	says "there is no conductance_S of dc rows"
+	recording 2 | sed 's/^\([0-9.]*,[0-9]*\),./\1,99/' >other.csv
+	plain_model >m.toml
+	run -0 --separate-stderr tactus force -m m.toml other.csv
+	says "quality says why"
+	recording 2 >some.csv
+	run -0 --separate-stderr tactus force -m m.toml some.csv
+	[ -z "$stderr" ] || fail "there are forces"
+}
+
 @test "force: estimating twice replaces the columns" {
 	plain_model >m.toml
 	recording | tactus force -m m.toml >once.csv
