@@ -110,9 +110,13 @@ cell() { column "$1" <"$2" | sed -n "$3p"; } # NAME FILE ROW
 		ac,3,4000,,0.5,ok
 		ac,3,4000,1,0.5,clipped
 		dc,-5,0,-1,,
+		ac,3,-4000,1,0.5,ok
+		ac,3,0,1,0.5,ok
 	END
 	tactus convert in.csv >out.csv
-	[ "$(column quality <out.csv | tr '\n' ' ')" = "ok wrong-sign folded+ill-conditioned clipped missing clipped wrong-sign " ]
+	[ "$(column quality <out.csv | tr '\n' ' ')" = "ok wrong-sign folded+ill-conditioned clipped missing clipped wrong-sign wrong-sign missing " ]
+	[ "$(cell capacitance_std_F out.csv 8)" = "$(cell capacitance_std_F out.csv 1)" ] || fail "an uncertainty has no sign"
+	[ -z "$(cell capacitance_F out.csv 9)$(cell capacitance_std_F out.csv 9)" ]
 	[ -z "$(cell resistance_ohm out.csv 5)" ]
 	near "$(cell resistance_ohm out.csv 2)" "$(cell resistance_ohm out.csv 1)" 1e-15
 }
