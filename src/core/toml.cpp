@@ -7,6 +7,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -144,6 +145,9 @@ int tactus_toml_read(const char *path, tactus_toml **document)
 		if (std::string(path) == "-") {
 			text.assign(std::istreambuf_iterator<char>(std::cin), {});
 		} else {
+			std::error_code unknown;
+			if (std::filesystem::is_directory(path, unknown))
+				return tactus_fail(TACTUS_ERR_INPUT, "%s: is a directory", path);
 			errno = 0;
 			std::ifstream file(path, std::ios::binary);
 			if (file)

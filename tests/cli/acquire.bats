@@ -80,6 +80,8 @@ columns() { grep -v '^#' | head -1; }
 		[ -z "$output" ]
 		[ ! -e out.csv ] || fail "$args: the file was begun"
 	done
+	run -2 --separate-stderr tactus scan sim: --drive=-3
+	says "not -3 V and 4000 Hz"
 }
 
 @test "scan --append needs a file to continue" {

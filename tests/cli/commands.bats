@@ -95,6 +95,11 @@ plain_model() {
 	[ -z "$stderr" ] || fail "there are forces"
 }
 
+@test "force: a directory is no model, and is called what it is" {
+	run -3 --separate-stderr tactus force -m . <<<""
+	[ "$stderr" = "tactus force: .: is a directory" ] || fail "what is it"
+}
+
 @test "force: estimating twice replaces the columns" {
 	plain_model >m.toml
 	recording | tactus force -m m.toml >once.csv
@@ -250,6 +255,18 @@ plain_model() {
 	status_is 0
 	prints "1.2e-06 ± 3e-08 S"
 	prints "valid from 0 to 250 N"
+}
+
+@test "show: standard input is told by its first bytes, like a file" {
+	plain_model >m.toml
+	recording >run.csv
+	for file in m.toml run.csv; do
+		tactus show $file | tail -n +2 >named.txt
+		tactus show - <$file | tail -n +2 | cmp - named.txt
+		cat $file | tactus show | tail -n +2 | cmp - named.txt
+	done
+	run -3 --separate-stderr tactus show - </dev/null
+	says "the file is empty"
 }
 
 @test "show a bench: built-in, and a file" {

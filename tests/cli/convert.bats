@@ -84,6 +84,15 @@ cell() { column "$1" <"$2" | sed -n "$3p"; } # NAME FILE ROW
 	[ "$(metadata gain_resistor_ohm <out.csv)" = 1800 ]
 }
 
+@test "metadata that are no number, or none that can be, are status 3 with their line" {
+	loads >in.csv
+	for wrong in abc -3; do
+		sed "s/^# gain_resistor_ohm: .*/# gain_resistor_ohm: $wrong/" in.csv >wrong.csv
+		run -3 --separate-stderr tactus convert wrong.csv
+		says "wrong.csv:$(grep -n gain_resistor wrong.csv | cut -d: -f1): metadata"
+	done
+}
+
 @test "drive and frequency: options for a log without them, refused where nobody states them" {
 	printf 'peak,angle\n1.5,0.2\n' >log.csv
 	run --separate-stderr tactus convert log.csv -g 1kohm --columns amplitude_V=peak,phase_rad=angle
