@@ -91,6 +91,8 @@ int read_number(const tactus_toml_node *at, const toml::node &node, const std::s
 	if (!node.is_number())
 		return wrong_type(at, node, what, "a number");
 	*value = *node.value<double>();
+	if (std::isnan(*value)) // no quantity of a file is that
+		return fail_at(at->document, node.source(), TACTUS_ERR_INPUT, what + " must be a number, not nan");
 	return 1;
 }
 
