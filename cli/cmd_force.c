@@ -1,29 +1,41 @@
 /* tactus force: readings and a model file → newtons with a standard uncertainty, sample by sample. */
-#include "cli.h"
+#include "newtons.h"
+
+struct force {
+	tactus_estimator *estimator;
+	struct cli_newtons newtons;
+};
 
 static int estimate(void *context, tactus_table *block)
 {
-	return tactus_estimator_block(context, block);
+	struct force *force = context;
+	int error = tactus_estimator_block(force->estimator, block);
+	if (!error)
+		cli_newtons_see(&force->newtons, block);
+	return error;
 }
 
 /* Channels that feel each other are solved jointly: a scan is not cut where a block ends. */
 static size_t incomplete(void *context, tactus_table *block)
 {
-	return tactus_estimator_incomplete(context, block);
+	const struct force *force = context;
+	return tactus_estimator_incomplete(force->estimator, block);
 }
 
 static int apply(const struct cli *cli, tactus_reader *reader, const tactus_model *model)
 {
 	char fingerprint[17];
-	tactus_estimator *estimator;
+	struct force force = {.newtons.model = model};
 	tactus_model_fingerprint(model, fingerprint);
 	int error = tactus_metadata_set(tactus_table_metadata(tactus_reader_block(reader)), "model", fingerprint);
 	if (!error)
-		error = tactus_estimator_new(model, &estimator);
+		error = tactus_estimator_new(model, &force.estimator);
 	if (error)
 		return cli_fail(cli, error);
-	int status = cli_stream_waiting(cli, reader, estimate, incomplete, estimator);
-	tactus_estimator_free(estimator);
+	int status = cli_stream_waiting(cli, reader, estimate, incomplete, &force);
+	if (status == CLI_OK)
+		cli_newtons_note(cli, &force.newtons);
+	tactus_estimator_free(force.estimator);
 	return status;
 }
 

@@ -6,7 +6,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "newtons.h"
 #include "operator.h"
 #include "tare.h"
 
@@ -21,12 +21,15 @@ struct scan {
 	tactus_converter *converter;
 	tactus_model *model;
 	tactus_estimator *estimator;
+	struct cli_newtons newtons;
 	tactus_writer *writer;
 	double after_s; /* --append: added to times and sequence numbers */
 	uint64_t after_scans;
-	struct cli_tare tare;        /* --tare */
-	struct cli_operator person;  /* --protocol on a real bench */
-	uint64_t first, last, scans; /* sequence numbers, and how many scans came */
+	struct cli_tare tare;       /* --tare */
+	struct cli_operator person; /* --protocol on a real bench */
+	uint64_t last;              /* sequence number */
+	uint64_t scans, lost;       /* that came, and that are missing between them */
+	uint64_t backward;          /* how often the sequence began anew */
 	bool progress;
 	double shown_s;
 };
@@ -186,6 +189,7 @@ static int build(struct scan *scan)
 		error = tactus_converter_new(scan->table, NULL, &scan->converter);
 	if (error || !scan->model)
 		return error;
+	scan->newtons.model = scan->model;
 	tactus_model_fingerprint(scan->model, fingerprint);
 	error = tactus_metadata_set(tactus_table_metadata(scan->table), "model", fingerprint);
 	if (!error)
@@ -196,11 +200,12 @@ static int build(struct scan *scan)
 static void count_scans(struct scan *scan, const tactus_reading *readings, size_t n)
 {
 	for (size_t i = 0; i < n; i++) {
-		if (!scan->scans)
-			scan->first = readings[i].sequence;
-		if (!scan->scans || readings[i].sequence != scan->last)
-			scan->scans++;
-		scan->last = readings[i].sequence;
+		const uint64_t sequence = readings[i].sequence;
+		const bool first = scan->scans == 0;
+		scan->lost += !first && sequence > scan->last ? sequence - scan->last - 1 : 0;
+		scan->backward += !first && sequence < scan->last;
+		scan->scans += first || sequence != scan->last;
+		scan->last = sequence;
 	}
 }
 
@@ -231,6 +236,8 @@ static int put(struct scan *scan, tactus_reading *readings, size_t n, bool first
 		error = tactus_converter_block(scan->converter, scan->table);
 	if (!error && scan->estimator)
 		error = tactus_estimator_block(scan->estimator, scan->table);
+	if (!error && scan->estimator)
+		cli_newtons_see(&scan->newtons, scan->table);
 	if (!error && first_second)
 		error = cli_tare_find(&scan->tare, scan->table, readings, n);
 	if (!error)
@@ -345,9 +352,14 @@ static int acquire(struct scan *scan)
 /* More scans lost than are allowed is a failure, even though what came is kept. */
 static int check_lost(const struct scan *scan, double share)
 {
-	const uint64_t expected = tactus_device_expected_scans(scan->device);
-	const uint64_t taken = scan->scans ? scan->last - scan->first + 1 : cli_signal ? 0 : expected;
-	const uint64_t lost = taken - scan->scans;
+	const bool none = !scan->scans && !cli_signal;
+	const uint64_t lost = none ? tactus_device_expected_scans(scan->device) : scan->lost;
+	const uint64_t taken = scan->scans + lost;
+	if (scan->backward)
+		cli_note(scan->cli,
+				 "sequence goes back at %llu place%s, as where recordings were put together: what was lost "
+				 "is counted within each",
+				 (unsigned long long)scan->backward, scan->backward == 1 ? "" : "s");
 	if (!lost)
 		return CLI_OK;
 	const double percent = 100 * (double)lost / (double)taken;
@@ -397,6 +409,8 @@ static int run_started(struct scan *scan, double share)
 		error = acquire(scan);
 	int status = cli_fail(scan->cli, error);
 	say_faults(scan);
+	if (!error && scan->estimator)
+		cli_newtons_note(scan->cli, &scan->newtons);
 	const int stopped = tactus_device_stop(scan->device);
 	const int closed = tactus_writer_close(scan->writer);
 	if (!error)

@@ -1,17 +1,32 @@
 /* tactus show: says what a model, bench or recording is; --effects prints the catalogue. */
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "show.h"
 
+/* The first bytes of standard input, which stay there to be read; NULL where that cannot be. */
+static FILE *peek(void)
+{
+	static char bytes[4096];
+	int copy[2];
+	ssize_t n = pread(STDIN_FILENO, bytes, sizeof bytes, lseek(STDIN_FILENO, 0, SEEK_CUR));
+	if (n < 0 && pipe(copy) == 0) {
+		n = tee(STDIN_FILENO, copy[1], sizeof bytes, 0) > 0 ? read(copy[0], bytes, sizeof bytes) : -1;
+		close(copy[0]);
+		close(copy[1]);
+	}
+	return n > 0 ? fmemopen(bytes, (size_t)n, "r") : NULL;
+}
+
 /* What the first line that is no comment looks like: `key = …` or `[table]` is TOML, anything else a recording. */
 static bool looks_like_toml(const char *file)
 {
 	char line[256];
 	bool toml = strncmp(file, "sim:", 4) == 0, begins = true;
-	FILE *stream = strcmp(file, "-") != 0 && !toml ? fopen(file, "r") : NULL;
+	FILE *stream = toml ? NULL : strcmp(file, "-") != 0 ? fopen(file, "r") : peek();
 	if (!stream && !toml)
 		return tactus_bench_is(file) || tactus_profile_is(file) || tactus_loads_is(file); /* built in */
 	while (stream && fgets(line, sizeof line, stream)) {

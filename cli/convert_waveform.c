@@ -15,10 +15,11 @@ struct waveform {
 	const char *name; /* of the input, in messages */
 	tactus_waveform how;
 	tactus_demodulator *demodulator;
-	tactus_table *readings;
+	tactus_table *block; /* of readings */
 	tactus_converter *converter;
 	tactus_writer *writer;
-	uint64_t lost; /* samples */
+	bool channels_given;     /* by the samples themselves: no dwell has to say where a channel ends */
+	uint64_t lost, readings; /* lost: samples; readings: that were written */
 };
 
 /* ---- common to all inputs ---- */
@@ -30,7 +31,7 @@ static int settle(const struct waveform *w, const char *option, const char *key,
 		*value = cli_quantity(w->cli, option, NAN);
 		return 0;
 	}
-	int found = tactus_metadata_get_number(tactus_table_metadata(w->readings), key, value);
+	int found = tactus_metadata_get_number(tactus_table_metadata(w->block), key, value);
 	return found < 0 ? found : 0;
 }
 
@@ -50,12 +51,32 @@ static int settle_all(struct waveform *w, bool drive_sampled)
 	if (!error)
 		error = settle(w, "dc-drive", "dc_drive_V", &w->how.dc_drive_V);
 	/* As the scan was made; what it does not say is ac. */
-	const char *modes = tactus_metadata_get(tactus_table_metadata(w->readings), "modes");
+	const char *modes = tactus_metadata_get(tactus_table_metadata(w->block), "modes");
 	w->how.modes = cli_string(w->cli, "mode", modes ? modes : "ac");
 	w->how.drive_phase_rad = cli_quantity(w->cli, "drive-phase", 0);
 	w->how.drive_sampled = drive_sampled;
 	w->how.clip_V = cli_quantity(w->cli, "clip", w->how.clip_V);
 	return error;
+}
+
+/* What the samples say themselves cannot be stated beside them. */
+static int refuse_stated_drive(const struct waveform *w)
+{
+	static const char *const stated[] = {"drive", "drive-phase", "dc-drive"};
+
+	for (size_t i = 0; w->how.drive_sampled && i < sizeof stated / sizeof *stated; i++)
+		if (cli_has(w->cli, stated[i]))
+			return cli_error(w->cli, CLI_USAGE, "--%s: the drive is sampled, and its samples say it already",
+							 stated[i]);
+	return CLI_OK;
+}
+
+/* Readings of a whole scan, each of one dwell; 1 where the samples say themselves where a reading ends. */
+static size_t planned(const struct waveform *w)
+{
+	size_t channels = w->how.channels ? w->how.channel_count : 1;
+
+	return w->channels_given ? 1 : channels * (strchr(w->how.modes, ',') ? 2 : 1);
 }
 
 /* An option that cannot be guessed. */
@@ -67,13 +88,15 @@ static int need(const struct waveform *w, double value, const char *option, cons
 static int begin(struct waveform *w)
 {
 	tactus_convert_options options = cli_convert_options(w->cli);
-	int status = need(w, w->how.rate_Hz, "sample-rate", "the samples' rate");
+	int status = refuse_stated_drive(w);
 
+	if (!status)
+		status = need(w, w->how.rate_Hz, "sample-rate", "the samples' rate");
 	bool ac = strstr(w->how.modes, "ac") != NULL, dc = strstr(w->how.modes, "dc") != NULL;
 
 	options.drive_V = options.frequency_Hz = NAN; /* every reading has its own */
-	if (!status && strchr(w->how.modes, ','))
-		status = need(w, w->how.dwell_s, "dwell", "the time per reading");
+	if (!status && (planned(w) > 1 || strchr(w->how.modes, ',')))
+		status = need(w, w->how.dwell_s, "dwell", "the time per channel and reading");
 	if (!status && dc && !w->how.drive_sampled)
 		status = need(w, w->how.dc_drive_V, "dc-drive", "the drive of the dc readings");
 	if (!status && ac)
@@ -84,10 +107,10 @@ static int begin(struct waveform *w)
 		return status;
 	int error = tactus_demodulator_new(&w->how, &w->demodulator);
 	if (!error)
-		error = (int)tactus_demodulator_add(w->demodulator, 0, NULL, NULL, NULL, w->readings);
-	tactus_table_remove(w->readings, "quality"); /* the converter puts it where the contract has it: last */
+		error = (int)tactus_demodulator_add(w->demodulator, 0, NULL, NULL, NULL, w->block);
+	tactus_table_remove(w->block, "quality"); /* the converter puts it where the contract has it: last */
 	if (!error)
-		error = tactus_converter_new(w->readings, &options, &w->converter);
+		error = tactus_converter_new(w->block, &options, &w->converter);
 	if (!error)
 		error = cli_open_writer(w->cli, &w->writer);
 	return error ? cli_fail(w->cli, error) : CLI_OK;
@@ -96,16 +119,17 @@ static int begin(struct waveform *w)
 /* Converts and writes the readings that are in the table. */
 static int put(struct waveform *w, long rows)
 {
-	int error = rows < 0 ? (int)rows : tactus_converter_block(w->converter, w->readings);
+	int error = rows < 0 ? (int)rows : tactus_converter_block(w->converter, w->block);
 
 	if (!error)
-		error = tactus_writer_rows(w->writer, w->readings);
+		error = tactus_writer_rows(w->writer, w->block);
+	w->readings += rows > 0 ? (uint64_t)rows : 0;
 	return error ? cli_fail(w->cli, error) : CLI_OK;
 }
 
 static int push(struct waveform *w, size_t n, const double *sample, const double *drive, const double *channel)
 {
-	long rows = tactus_demodulator_add(w->demodulator, n, sample, drive, channel, w->readings);
+	long rows = tactus_demodulator_add(w->demodulator, n, sample, drive, channel, w->block);
 
 	return rows == 0 ? CLI_OK : put(w, rows);
 }
@@ -136,11 +160,26 @@ static int push_lost(struct waveform *w, uint64_t count, bool with_channel)
 	return status;
 }
 
+/* A dwell that is longer than the samples would make one reading of all channels. */
+static int finish(struct waveform *w)
+{
+	if (w->readings == 0 && planned(w) > 1 && !cli_signal)
+		return cli_error(w->cli, CLI_INPUT,
+						 "%s: the samples end within the first dwell of %g s, before the second of "
+						 "%zu readings begins",
+						 w->name, w->how.dwell_s, planned(w));
+	int status = put(w, tactus_demodulator_finish(w->demodulator, w->block));
+	if (!status && w->readings < planned(w) && !cli_signal)
+		cli_note(w->cli, "%s: the samples end within the first scan, after %llu of its %zu readings", w->name,
+				 (unsigned long long)w->readings, planned(w));
+	return status;
+}
+
 /* status: how the input ended. */
 static int end(struct waveform *w, int status)
 {
 	if (w->writer && !status)
-		status = put(w, tactus_demodulator_finish(w->demodulator, w->readings));
+		status = finish(w);
 	if (w->writer && status) {
 		tactus_writer_abort(w->writer);
 	} else if (w->writer) {
@@ -152,7 +191,7 @@ static int end(struct waveform *w, int status)
 				 w->name, (unsigned long long)w->lost);
 	tactus_converter_free(w->converter);
 	tactus_demodulator_free(w->demodulator);
-	tactus_table_free(w->readings);
+	tactus_table_free(w->block);
 	return status;
 }
 
@@ -267,6 +306,7 @@ static int run_csv(struct waveform *w, tactus_reader *reader, struct samples *s)
 	long rows = 1;
 	int status = settle_all(w, drive);
 
+	w->channels_given = tactus_table_find(tactus_reader_block(reader), column_names[CHANNEL]) >= 0;
 	if (status)
 		return cli_fail(w->cli, status);
 	if (tactus_table_find(tactus_reader_block(reader), column_names[SAMPLE]) < 0)
@@ -311,7 +351,7 @@ static int convert_csv(struct waveform *w)
 
 	if (error)
 		return cli_fail(w->cli, error);
-	error = copy_metadata(tactus_table_metadata(w->readings), tactus_table_metadata(tactus_reader_block(reader)));
+	error = copy_metadata(tactus_table_metadata(w->block), tactus_table_metadata(tactus_reader_block(reader)));
 	int status = error ? cli_fail(w->cli, error) : run_csv(w, reader, &samples);
 	for (size_t k = 0; k < COLUMNS; k++)
 		free(samples.columns[k]);
@@ -423,9 +463,9 @@ int cli_convert_waveform(const struct cli *cli, const char *recording)
 	if (status)
 		return status;
 	w.how.channels = channels;
-	w.readings = tactus_table_new();
+	w.block = tactus_table_new();
 	cli_catch_signals();
-	if (!w.readings)
+	if (!w.block)
 		status = cli_error(cli, CLI_FAILED, "memory ran out");
 	else
 		status = end(&w, strcmp(format, "csv") == 0 ? convert_csv(&w) : convert_binary(&w, format[0] == 'f'));

@@ -31,9 +31,7 @@ static int fail(const struct cli *cli, struct cli_output *output, const char *wh
 
 static FILE *open_beside(struct cli_output *output, mode_t mode)
 {
-	output->real = realpath(output->path, NULL); /* a link is written through */
-	if (!output->real)
-		output->real = strdup(output->path);
+	output->real = tactus_writer_path(output->path);
 	if (!output->real || asprintf(&output->beside, "%s.%ld.part", output->real, (long)getpid()) < 0) {
 		output->beside = NULL;
 		return NULL;

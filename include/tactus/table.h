@@ -154,6 +154,11 @@ TACTUS_API int tactus_writer_flush(tactus_writer *writer);
 TACTUS_API int tactus_writer_close(tactus_writer *writer);
 /** Frees the handle and removes what was written beside (an in-place file is kept). */
 TACTUS_API void tactus_writer_abort(tactus_writer *writer);
+/**
+ * The file that is written where `path` is named: links are followed, also to a file that is not there yet. The caller
+ * frees it. NULL when memory runs out.
+ */
+TACTUS_API char *tactus_writer_path(const char *path);
 
 /* ---- numbers ---- */
 

@@ -235,11 +235,11 @@ int tactus_comment_line(struct tactus_reader *reader, const char *text, size_t l
 		colon++;
 	tactus_text key = tactus_field_trim((tactus_text){text, (size_t)(colon - text)}, &quoted);
 	if (colon == end || key.length == 0 || quoted)
-		return tactus_metadata_append(metadata, "", 0, text, length);
+		return tactus_metadata_append(metadata, "", 0, text, length, reader->input.line);
 	tactus_text value = tactus_field_trim((tactus_text){colon + 1, (size_t)(end - colon - 1)}, &quoted);
 	if (quoted)
 		value = (tactus_text){value.text - 1, value.length + 2};
-	return tactus_metadata_append(metadata, key.text, key.length, value.text, value.length);
+	return tactus_metadata_append(metadata, key.text, key.length, value.text, value.length, reader->input.line);
 }
 
 static void choose_delimiter(struct tactus_reader *reader, const char *line)

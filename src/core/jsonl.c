@@ -57,7 +57,7 @@ static int add_value(const struct tactus_reader *reader, const char *key, const 
 		return tactus_input_fail(&reader->input, "metadata '%s' is neither a text nor a number", key);
 	if (strcmp(key, "#") == 0)
 		key = ""; /* comments */
-	return tactus_metadata_append(reader->table->metadata, key, strlen(key), text, strlen(text));
+	return tactus_metadata_append(reader->table->metadata, key, strlen(key), text, strlen(text), reader->input.line);
 }
 
 static int add_metadata(struct tactus_reader *reader, json_t *metadata)

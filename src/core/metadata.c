@@ -1,4 +1,6 @@
 /* Metadata: an ordered list of `key: value` pairs. A comment line is a pair whose key is "". */
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,11 +9,13 @@
 
 struct pair {
 	char *key, *value;
+	size_t line; /* of the file, 0: it was set */
 };
 
 struct tactus_metadata {
 	struct pair *pairs;
 	size_t count, capacity;
+	char *file; /* NULL: none */
 };
 
 tactus_metadata *tactus_metadata_new(void)
@@ -28,7 +32,15 @@ void tactus_metadata_free(tactus_metadata *metadata)
 		free(metadata->pairs[i].value);
 	}
 	free(metadata->pairs);
+	free(metadata->file);
 	free(metadata);
+}
+
+int tactus_metadata_set_file(tactus_metadata *metadata, const char *file)
+{
+	free(metadata->file);
+	metadata->file = tactus_strndup(file, strlen(file));
+	return metadata->file ? TACTUS_OK : tactus_fail(TACTUS_ERR_MEMORY, "memory ran out");
 }
 
 /* The index of the first pair with that key at or after `from`, or count. */
@@ -48,7 +60,7 @@ static void remove_at(tactus_metadata *metadata, size_t i)
 }
 
 int tactus_metadata_append(tactus_metadata *metadata, const char *key, size_t key_length, const char *value,
-						   size_t value_length)
+						   size_t value_length, size_t line)
 {
 	if (metadata->count == metadata->capacity) {
 		size_t capacity = metadata->capacity ? 2 * metadata->capacity : 16;
@@ -58,7 +70,7 @@ int tactus_metadata_append(tactus_metadata *metadata, const char *key, size_t ke
 		metadata->pairs = pairs;
 		metadata->capacity = capacity;
 	}
-	struct pair pair = {tactus_strndup(key, key_length), tactus_strndup(value, value_length)};
+	struct pair pair = {tactus_strndup(key, key_length), tactus_strndup(value, value_length), line};
 	if (!pair.key || !pair.value) {
 		free(pair.key);
 		free(pair.value);
@@ -72,12 +84,13 @@ int tactus_metadata_set(tactus_metadata *metadata, const char *key, const char *
 {
 	size_t i = find(metadata, key, 0);
 	if (value && i == metadata->count)
-		return tactus_metadata_append(metadata, key, strlen(key), value, strlen(value));
+		return tactus_metadata_append(metadata, key, strlen(key), value, strlen(value), 0);
 	if (value) {
 		char *copy = tactus_strndup(value, strlen(value));
 		if (!copy)
 			return tactus_fail(TACTUS_ERR_MEMORY, "memory ran out");
 		free(metadata->pairs[i].value);
+		metadata->pairs[i].line = 0;
 		metadata->pairs[i++].value = copy;
 	}
 	/* a file may have said the key twice */
@@ -98,13 +111,26 @@ const char *tactus_metadata_get(const tactus_metadata *metadata, const char *key
 	return i < metadata->count ? metadata->pairs[i].value : NULL;
 }
 
+int tactus_metadata_fail(const tactus_metadata *metadata, const char *key, const char *format, ...)
+{
+	char text[512];
+	va_list arguments;
+	size_t i = find(metadata, key, 0);
+	va_start(arguments, format);
+	vsnprintf(text, sizeof text, format, arguments);
+	va_end(arguments);
+	if (!metadata->file || i == metadata->count || !metadata->pairs[i].line)
+		return tactus_fail(TACTUS_ERR_INPUT, "%s", text);
+	return tactus_fail(TACTUS_ERR_INPUT, "%s:%zu: %s", metadata->file, metadata->pairs[i].line, text);
+}
+
 int tactus_metadata_get_number(const tactus_metadata *metadata, const char *key, double *value)
 {
 	const char *text = tactus_metadata_get(metadata, key);
 	if (!text)
 		return 0;
 	if (!tactus_parse_number(text, strlen(text), value))
-		return tactus_fail(TACTUS_ERR_INPUT, "metadata '%s': '%.60s' is not a number", key, text);
+		return tactus_metadata_fail(metadata, key, "metadata '%s': '%.60s' is not a number", key, text);
 	return 1;
 }
 

@@ -1,6 +1,7 @@
 /* Bytes to a file or stream: every write checked, a new file written beside and renamed. */
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -56,11 +57,20 @@ static int open_in_place(struct tactus_output *output, bool exists)
 	return TACTUS_OK;
 }
 
-/* A link is written through: the file it names is the one that is replaced. */
-static char *resolve(const char *path)
+/* realpath() does not follow a link whose file is not there yet; that of a pipe (/dev/fd/4) names no file. */
+char *tactus_writer_path(const char *path)
 {
+	char target[PATH_MAX];
 	char *real = realpath(path, NULL);
-	return real ? real : tactus_strndup(path, strlen(path));
+	bool dangles = !real && access(path, F_OK) != 0 && errno == ENOENT;
+	ssize_t length = dangles ? readlink(path, target, sizeof target) : -1;
+	if (real || length < 0)
+		return real ? real : tactus_strndup(path, strlen(path));
+	const char *slash = target[0] == '/' ? NULL : strrchr(path, '/'); /* it is relative to the link's directory */
+	char *next = tactus_asprintf("%.*s%.*s", slash ? (int)(slash - path + 1) : 0, path, (int)length, target);
+	real = next ? tactus_writer_path(next) : NULL;
+	free(next);
+	return real;
 }
 
 static int open_path(struct tactus_output *output, const char *path, unsigned flags)
@@ -74,7 +84,7 @@ static int open_path(struct tactus_output *output, const char *path, unsigned fl
 	output->replace = (flags & (TACTUS_WRITE_OVERWRITE | TACTUS_WRITE_APPEND)) != 0;
 	if (exists && regular && !output->replace)
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "%s: exists already; give --overwrite to replace it", path);
-	output->path = resolve(path);
+	output->path = tactus_writer_path(path); /* that of a link is replaced, not the link */
 	if (!output->path)
 		return tactus_fail(TACTUS_ERR_MEMORY, "memory ran out");
 	bool in_place = !regular || (flags & (TACTUS_WRITE_IN_PLACE | TACTUS_WRITE_APPEND));

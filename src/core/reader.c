@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/core.h"
+#include "core/metadata.h"
 #include "core/reader.h"
 
 enum { BLOCK_ROWS = 2048 };
@@ -28,7 +29,9 @@ static int start(struct tactus_reader *reader)
 	table->file = tactus_strndup(reader->input.name, strlen(reader->input.name));
 	if (!table->file)
 		return tactus_fail(TACTUS_ERR_MEMORY, "memory ran out");
-	int error = check_start(&reader->input);
+	int error = tactus_metadata_set_file(table->metadata, table->file);
+	if (!error)
+		error = check_start(&reader->input);
 	if (error)
 		return error;
 	const struct tactus_input *input = &reader->input;

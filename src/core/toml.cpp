@@ -7,6 +7,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -90,6 +91,8 @@ int read_number(const tactus_toml_node *at, const toml::node &node, const std::s
 	if (!node.is_number())
 		return wrong_type(at, node, what, "a number");
 	*value = *node.value<double>();
+	if (std::isnan(*value)) // no quantity of a file is that
+		return fail_at(at->document, node.source(), TACTUS_ERR_INPUT, what + " must be a number, not nan");
 	return 1;
 }
 
@@ -144,6 +147,9 @@ int tactus_toml_read(const char *path, tactus_toml **document)
 		if (std::string(path) == "-") {
 			text.assign(std::istreambuf_iterator<char>(std::cin), {});
 		} else {
+			std::error_code unknown;
+			if (std::filesystem::is_directory(path, unknown))
+				return tactus_fail(TACTUS_ERR_INPUT, "%s: is a directory", path);
 			errno = 0;
 			std::ifstream file(path, std::ios::binary);
 			if (file)

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "core/core.h"
@@ -151,6 +152,20 @@ static int read_text(const tactus_toml_node *table, const char *key, char **text
 	return 1;
 }
 
+/* The instant that recordings state as theirs. */
+static int read_start(const tactus_toml_node *root, tactus_bench *bench)
+{
+	struct tm utc;
+	const int status = read_text(root, "start", &bench->start);
+	if (status <= 0)
+		return status;
+	const char *end = strptime(bench->start, "%Y-%m-%dT%H:%M:%SZ", &utc);
+	return end != NULL && *end == '\0'
+			   ? status
+			   : tactus_toml_fail(root, "start", TACTUS_ERR_INPUT,
+								  "'%s' is no instant in UTC, such as 2010-05-03T09:00:00Z", bench->start);
+}
+
 static int read_modes(const tactus_toml_node *root, tactus_bench *bench)
 {
 	const tactus_toml_node *scan = NULL, *modes = NULL;
@@ -194,7 +209,7 @@ static int read_head(const tactus_toml_node *root, tactus_bench *bench)
 	if (status >= 0)
 		status = read_text(root, "description", &bench->description);
 	if (status >= 0)
-		status = read_text(root, "start", &bench->start);
+		status = read_start(root, bench);
 	if (status >= 0)
 		status = read_text(root, "protocol", &bench->protocol);
 	if (status >= 0)

@@ -1,4 +1,5 @@
 /* The sensors of a bench file, and the effects of the catalogue on them and on the readout. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,8 +42,10 @@ static int read_sensor(const tactus_toml_node *node, tactus_bench_sensor *sensor
 	const tactus_domain *domain = &tactus_domain_sensor;
 	const tactus_toml_node *jump = NULL;
 	int status = read_keys(node, sensor_keys, TACTUS_COUNT(sensor_keys), sensor);
-	for (size_t i = 0; i < domain->base_count && status >= 0; i++)
-		status = tactus_toml_number(node, domain->base[i].name, &sensor->base[i]);
+	for (size_t i = 0; i < domain->base_count && status >= 0; i++) {
+		const tactus_bench_key key = {domain->base[i].name, 'n', 0, -DBL_MAX, DBL_MAX};
+		status = tactus_bench_read_key(node, &key, &sensor->base[i]);
+	}
 	if (status >= 0)
 		status = tactus_toml_table(node, "contact_jump", &jump);
 	if (status > 0)
@@ -82,14 +85,28 @@ static int read_channel(const tactus_toml_node *node, tactus_bench *bench, tactu
 	return TACTUS_OK;
 }
 
+/* Whether one of the [[sensor]]s before the i-th is of that channel. */
+static bool is_before(const tactus_toml_node *array, size_t i, int channel)
+{
+	long long other = 0;
+	for (size_t k = 0; k < i; k++)
+		if (tactus_toml_integer(tactus_toml_at(array, k), "channel", &other) > 0 && other == channel)
+			return true;
+	return false;
+}
+
 int tactus_bench_read_sensors(const tactus_toml_node *root, tactus_bench *bench)
 {
 	const tactus_toml_node *every = NULL, *array = NULL;
 	tactus_bench_sensor *sensor = NULL;
 	int status = tactus_toml_array(root, "sensor", &array);
 	const size_t count = status > 0 ? tactus_toml_size(array) : 0;
-	for (size_t i = 0; i < count && status >= 0; i++)
+	for (size_t i = 0; i < count && status >= 0; i++) {
 		status = read_channel(tactus_toml_at(array, i), bench, &sensor);
+		if (status >= 0 && is_before(array, i, sensor->channel))
+			status = tactus_toml_fail(tactus_toml_at(array, i), "channel", TACTUS_ERR_INPUT,
+									  "channel %d is there twice", sensor->channel);
+	}
 	if (status >= 0)
 		status = tactus_toml_table(root, "every_sensor", &every);
 	for (size_t i = 0; every != NULL && i < bench->sensor_count && status >= 0; i++)

@@ -45,6 +45,9 @@ static int choose_modes(tactus_plan *plan, const tactus_scan_settings *settings)
 	plan->drive_V = given(dc_only ? NAN : settings->drive_V, plan->bench->scan.drive_V);
 	plan->dc_drive_V = given(dc_only ? settings->drive_V : NAN, plan->bench->scan.dc_drive_V);
 	plan->frequency_Hz = given(settings->frequency_Hz, plan->bench->scan.frequency_Hz);
+	if ((plan->modes & TACTUS_MODE_AC) != 0 && (plan->drive_V < 0 || plan->frequency_Hz < 0))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "AC needs a drive and a frequency above zero, not %g V and %g Hz",
+						   plan->drive_V, plan->frequency_Hz);
 	if ((plan->modes & TACTUS_MODE_AC) != 0 && !(plan->drive_V > 0 && plan->frequency_Hz > 0))
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "AC needs a drive and a frequency above zero; this bench states none");
 	if ((plan->modes & TACTUS_MODE_DC) != 0 && plan->dc_drive_V == 0)

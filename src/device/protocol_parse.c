@@ -240,13 +240,27 @@ static int fail_unknown_word(const parser *p)
 	return fail_word(p, "", names);
 }
 
+static const tactus_protocol_word *step_word(const parser *p)
+{
+	for (const tactus_protocol_word *word = tactus_protocol_words; word->name != NULL; word++)
+		if (token_is(p, word->name))
+			return word;
+	return NULL;
+}
+
+/* What follows a step that is complete: the next one, or an argument that no step has. */
+static int fail_no_comma(const parser *p, const char *usage)
+{
+	const bool step = token_is(p, "repeat") || step_word(p) != NULL;
+	return step ? fail_word(p, "a comma must stand before ", "")
+				: fail_word(p, "a comma must stand here, or nothing, not ", usage);
+}
+
 static int parse_step(parser *p)
 {
-	tactus_protocol_step step = {0};
+	tactus_protocol_step step = {.word = step_word(p)};
 	if (token_is(p, "repeat"))
 		return parse_repeat(p);
-	for (const tactus_protocol_word *word = tactus_protocol_words; word->name != NULL && step.word == NULL; word++)
-		step.word = token_is(p, word->name) ? word : NULL;
 	if (step.word == NULL)
 		return token_ends_step(p) ? fail_word(p, "a step must stand here, not ", "") : fail_unknown_word(p);
 	char usage[96];
@@ -266,7 +280,7 @@ static int parse_step(parser *p)
 	const int code = append(p, step);
 	advance(p);
 	if (code == TACTUS_OK && !token_ends_step(p))
-		return fail_word(p, "", usage);
+		return fail_no_comma(p, usage);
 	return code;
 }
 
@@ -288,7 +302,7 @@ int tactus_protocol_parse(const char *text, uint64_t seed, tactus_protocol **pro
 	advance(&p);
 	int code = parse_steps(&p);
 	if (code == TACTUS_OK && p.length > 0)
-		code = fail_word(&p, "", " has no '(' before it");
+		code = token_is(&p, ")") ? fail_word(&p, "", " has no '(' before it") : fail_no_comma(&p, "");
 	if (code < 0) {
 		tactus_protocol_free(p.protocol);
 		return code;

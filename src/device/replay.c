@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "core/core.h"
 #include "core/table.h"
@@ -13,7 +14,9 @@ typedef struct {
 	tactus_table *block; /* rows that were read and not yet given */
 	size_t rows, next;
 	tactus_scan_settings settings;
-	int *channels; /* that are wanted; NULL: all */
+	int *channels;      /* that are wanted; NULL: all */
+	bool *channel_seen; /* of channels: whether a row was of it */
+	unsigned modes_seen;
 	uint64_t scans, last_sequence, row_number;
 	bool any, over;
 	double first_s;
@@ -45,6 +48,7 @@ static void replay_close(tactus_device *device)
 	if (r->reader != NULL)
 		tactus_reader_close(r->reader);
 	free(r->channels);
+	free(r->channel_seen);
 	free(r->path);
 	free(r);
 }
@@ -108,43 +112,17 @@ static int find_columns(tactus_device *device, const tactus_table *block)
 static int copy_channels(replay *r, const tactus_scan_settings *settings)
 {
 	free(r->channels);
+	free(r->channel_seen);
 	r->channels = NULL;
+	r->channel_seen = NULL;
+	r->modes_seen = 0;
 	if (settings->channel_count == 0)
 		return TACTUS_OK;
 	r->channels = calloc(settings->channel_count, sizeof(*r->channels));
-	if (r->channels == NULL)
+	r->channel_seen = calloc(settings->channel_count, sizeof(*r->channel_seen));
+	if (r->channels == NULL || r->channel_seen == NULL)
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	memcpy(r->channels, settings->channels, settings->channel_count * sizeof(*r->channels));
-	return TACTUS_OK;
-}
-
-static int replay_start(tactus_device *device, const tactus_scan_settings *settings)
-{
-	replay *r = device->state;
-	int code = refuse_settings(settings);
-	if (code >= 0 && r->reader == NULL)
-		code = tactus_reader_open(r->path, NULL, &r->reader);
-	if (code >= 0)
-		code = copy_channels(r, settings);
-	if (code < 0)
-		return code;
-	r->settings = *settings;
-	r->rows = r->next = 0;
-	r->scans = r->row_number = 0;
-	r->any = r->over = false;
-	r->pace = (tactus_pace){0};
-	tactus_table *block = tactus_reader_block(r->reader);
-	code = copy_metadata(tactus_table_metadata(block), device->metadata);
-	device->expected_scans = settings->count;
-	return code < 0 ? code : find_columns(device, block);
-}
-
-/* A scan can be started again: the file is then read again from its beginning. */
-static int replay_stop(tactus_device *device)
-{
-	replay *r = device->state;
-	tactus_reader_close(r->reader);
-	r->reader = NULL;
 	return TACTUS_OK;
 }
 
@@ -165,16 +143,97 @@ static bool row_is_ac(const tactus_table *block, size_t row)
 	return !isnan(number_at(block, "phase_rad", row, NAN)) || !isnan(number_at(block, "detector_phase_V", row, NAN));
 }
 
+static int row_channel(const tactus_table *block, size_t row)
+{
+	const double channel = number_at(block, "channel", row, NAN);
+	return channel >= 0 && channel < 1e6 ? (int)channel : 1;
+}
+
+/* ---- whether the recording has what was asked for ---- */
+
+static void see(replay *r, int channel, unsigned mode)
+{
+	for (size_t i = 0; r->channels != NULL && i < r->settings.channel_count; i++)
+		r->channel_seen[i] = r->channel_seen[i] || r->channels[i] == channel;
+	r->modes_seen |= mode;
+}
+
+/* The code with its message where a channel or a mode that was asked for was not seen. */
+static int fail_unseen(const replay *r, int code)
+{
+	const unsigned modes = r->settings.modes & ~r->modes_seen;
+	for (size_t i = 0; r->channels != NULL && i < r->settings.channel_count; i++)
+		if (!r->channel_seen[i])
+			return tactus_fail(code, "%s has no channel %d", r->path, r->channels[i]);
+	return modes == 0 ? TACTUS_OK
+					  : tactus_fail(code, "%s has no %s readings", r->path, modes & TACTUS_MODE_DC ? "dc" : "ac");
+}
+
+/*
+ * A file is read ahead, mostly no further than its first scan; a pipe shows only at its end what it did not have, and a
+ * line that does not parse is met when it is played.
+ */
+static int look_ahead(replay *r)
+{
+	struct stat status;
+	tactus_reader *reader;
+	tactus_table *block;
+	long rows = 1;
+	if (stat(r->path, &status) != 0 || !S_ISREG(status.st_mode) || fail_unseen(r, TACTUS_ERR_ARGUMENT) >= 0)
+		return TACTUS_OK;
+	int code = tactus_reader_open(r->path, NULL, &reader);
+	if (code < 0)
+		return code;
+	while (fail_unseen(r, TACTUS_ERR_ARGUMENT) < 0 && (rows = tactus_reader_next(reader, 0, &block)) > 0)
+		for (size_t i = 0; i < (size_t)rows; i++)
+			see(r, row_channel(block, i), row_is_ac(block, i) ? TACTUS_MODE_AC : TACTUS_MODE_DC);
+	tactus_reader_close(reader);
+	return rows < 0 ? TACTUS_OK : fail_unseen(r, TACTUS_ERR_ARGUMENT);
+}
+
+static int replay_start(tactus_device *device, const tactus_scan_settings *settings)
+{
+	replay *r = device->state;
+	int code = refuse_settings(settings);
+	if (code >= 0 && r->reader == NULL)
+		code = tactus_reader_open(r->path, NULL, &r->reader);
+	if (code >= 0)
+		code = copy_channels(r, settings);
+	if (code < 0)
+		return code;
+	r->settings = *settings;
+	code = look_ahead(r);
+	if (code < 0)
+		return code;
+	r->rows = r->next = 0;
+	r->scans = r->row_number = 0;
+	r->any = r->over = false;
+	r->pace = (tactus_pace){0};
+	tactus_table *block = tactus_reader_block(r->reader);
+	code = copy_metadata(tactus_table_metadata(block), device->metadata);
+	device->expected_scans = settings->count;
+	return code < 0 ? code : find_columns(device, block);
+}
+
+/* A scan can be started again: the file is then read again from its beginning. */
+static int replay_stop(tactus_device *device)
+{
+	replay *r = device->state;
+	tactus_reader_close(r->reader);
+	r->reader = NULL;
+	return TACTUS_OK;
+}
+
 static tactus_reading row_reading(const replay *r, size_t row)
 {
 	const tactus_table *block = r->block;
 	const tactus_text *quality = tactus_table_texts(block, "quality");
 	const bool ac = row_is_ac(block, row);
-	const double sequence = number_at(block, "sequence", row, NAN), channel = number_at(block, "channel", row, NAN);
+	const double sequence = number_at(block, "sequence", row, NAN);
 	return (tactus_reading){
 		.time_s = number_at(block, "time_s", row, NAN),
 		.sequence = sequence >= 0 ? tactus_whole(sequence) : r->row_number,
-		.channel = channel >= 0 && channel < 1e6 ? (int)channel : 1,
+		.channel = row_channel(block, row),
 		.mode = ac ? TACTUS_MODE_AC : TACTUS_MODE_DC,
 		.drive_V = number_at(block, "drive_V", row, NAN),
 		.frequency_Hz = number_at(block, "frequency_Hz", row, ac ? NAN : 0),
@@ -237,9 +296,12 @@ static long replay_read(tactus_device *device, tactus_reading *readings, size_t 
 		const long more = more_rows(r);
 		if (more < 0)
 			return more;
+		if (more == 0 && n == 0)
+			return fail_unseen(r, TACTUS_ERR_INPUT);
 		if (more == 0)
 			break;
 		const tactus_reading reading = row_reading(r, r->next);
+		see(r, reading.channel, reading.mode);
 		if (wanted(r, &reading)) {
 			/* In real time a scan is given when its last reading was taken; the first row of the next stays here. */
 			if (r->settings.realtime && n > 0 && reading.sequence != readings[0].sequence)

@@ -197,5 +197,8 @@ int tactus_model_write(const tactus_model *model, const char *path, bool overwri
 	}
 	if (!overwrite && access(path, F_OK) == 0)
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "%s exists; --overwrite replaces it", path);
-	return write_file(model, path);
+	char *written = tactus_writer_path(path);
+	int status = written ? write_file(model, written) : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
+	free(written);
+	return status;
 }

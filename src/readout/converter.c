@@ -6,6 +6,7 @@
 #include <tactus/error.h>
 
 #include "core/core.h"
+#include "core/metadata.h"
 #include "core/table.h"
 #include "readout/impedance.h"
 
@@ -55,8 +56,8 @@ static int settle(tactus_metadata *metadata, const char *key, enum range range, 
 	if (there <= 0)
 		return there;
 	if (range == POSITIVE ? found <= 0 : range == NOT_NEGATIVE ? found < 0 : found == 0)
-		return tactus_fail(isnan(option) ? TACTUS_ERR_INPUT : TACTUS_ERR_ARGUMENT, "%s: %g is out of range", key,
-						   found);
+		return isnan(option) ? tactus_metadata_fail(metadata, key, "metadata %s: %g is out of range", key, found)
+							 : tactus_fail(TACTUS_ERR_ARGUMENT, "%s: %g is out of range", key, found);
 	*value = found;
 	return isnan(option) ? 0 : tactus_metadata_set_number(metadata, key, option);
 }

@@ -7,6 +7,7 @@
 #include <tactus/error.h>
 
 #include "core/core.h"
+#include "core/metadata.h"
 
 /* A number that may be left out (NaN then) and may not be zero. Returns 1, 0 or an error. */
 static int get_scale(const tactus_metadata *metadata, const char *key, double *value)
@@ -16,7 +17,7 @@ static int get_scale(const tactus_metadata *metadata, const char *key, double *v
 	*value = NAN;
 	found = tactus_metadata_get_number(metadata, key, value);
 	if (found > 0 && *value == 0)
-		return tactus_fail(TACTUS_ERR_INPUT, "metadata %s: a detector's scale cannot be 0", key);
+		return tactus_metadata_fail(metadata, key, "metadata %s: a detector's scale cannot be 0", key);
 	return found;
 }
 
@@ -30,7 +31,8 @@ static int get_polarity(const tactus_metadata *metadata, bool *inverted)
 						   "polarity its voltage has no meaning");
 	*inverted = strcmp(text, "true") == 0;
 	if (!*inverted && strcmp(text, "false") != 0)
-		return tactus_fail(TACTUS_ERR_INPUT, "metadata detector_phase_inverted: '%s' is neither true nor false", text);
+		return tactus_metadata_fail(metadata, "detector_phase_inverted",
+									"metadata detector_phase_inverted: '%s' is neither true nor false", text);
 	return 0;
 }
 

@@ -66,10 +66,10 @@ INLINE void ac_all(const tactus_readout *readout, size_t n, const struct tactus_
 		conductance[i] = finite_or_nan(g);
 		capacitance[i] = c;
 		conductance_std[i] = g_std = finite_or_nan(g_std * known);
-		capacitance_std[i] = b_std = finite_or_nan(b_std * per_omega * known);
+		capacitance_std[i] = b_std = finite_or_nan(b_std * fabs(per_omega) * known);
 		resistance_std[i] = finite_or_nan(g_std * r * r);
 		work->quality[i] =
-			flag_if((g < 0) | (c < 0), TACTUS_QUALITY_WRONG_SIGN) |
+			flag_if((g < 0) | (c < 0) | (frequency[i] < 0), TACTUS_QUALITY_WRONG_SIGN) |
 			flag_if((g_std > 0.5 * fabs(g)) | (b_std > 0.5 * fabs(c)) | (g == 0), TACTUS_QUALITY_ILL_CONDITIONED);
 	}
 }
@@ -84,9 +84,10 @@ INLINE void ac_flags(const tactus_readout *readout, size_t n, const struct tactu
 		double a = in->amplitude_V[i], f = in->frequency_Hz[i], drive = in->drive_V[i];
 		double phase = fabs(in->phase_rad[i]), near = in->phase_std_rad[i] > 0 ? in->phase_std_rad[i] * folds : NAN;
 
-		quality[i] |= flag_if(a >= limit, TACTUS_QUALITY_CLIPPED) |
-					  flag_if((phase <= near) | (fabs(M_PI - phase) <= near), TACTUS_QUALITY_FOLDED) |
-					  flag_if(!((a == a) & (phase == phase) & (f > 0) & (fabs(drive) > 0)), TACTUS_QUALITY_MISSING);
+		quality[i] |=
+			flag_if(a >= limit, TACTUS_QUALITY_CLIPPED) |
+			flag_if((phase <= near) | (fabs(M_PI - phase) <= near), TACTUS_QUALITY_FOLDED) |
+			flag_if(!((a == a) & (phase == phase) & (fabs(f) > 0) & (fabs(drive) > 0)), TACTUS_QUALITY_MISSING);
 	}
 }
 

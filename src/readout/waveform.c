@@ -67,8 +67,10 @@ static int check(const tactus_waveform *w)
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "where one reading of a channel ends is not known: dwell_s is needed");
 	if (has_mode(w, "dc") && !w->drive_sampled && (isnan(w->dc_drive_V) || w->dc_drive_V == 0))
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "the drive of the dc readings is neither sampled nor known");
-	if (!(w->rate_Hz > 0))
+	if (isnan(w->rate_Hz))
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "the samples' rate is not known");
+	if (!(w->rate_Hz > 0))
+		return tactus_fail(TACTUS_ERR_ARGUMENT, "the samples' rate (%g Hz) must be above 0", w->rate_Hz);
 	if (has_mode(w, "ac") && !(w->frequency_Hz > 0 && w->frequency_Hz < 0.5 * w->rate_Hz))
 		return tactus_fail(TACTUS_ERR_ARGUMENT,
 						   "the drive's frequency (%g Hz) must be above 0 and below half the samples' "

@@ -80,6 +80,8 @@ columns() { grep -v '^#' | head -1; }
 		[ -z "$output" ]
 		[ ! -e out.csv ] || fail "$args: the file was begun"
 	done
+	run -2 --separate-stderr tactus scan sim: --drive=-3
+	says "not -3 V and 4000 Hz"
 }
 
 @test "scan --append needs a file to continue" {
@@ -133,6 +135,29 @@ columns() { grep -v '^#' | head -1; }
 	done
 	tactus scan replay:run.csv --channels 2 --mode ac --count 3 >some.csv
 	[ "$(column channel <some.csv | sort -u) $(column mode <some.csv | sort -u) $(column time_s <some.csv | wc -l)" = "2 ac 3" ]
+}
+
+@test "scan replay: a channel or mode that the recording does not have is refused as on a bench, of a pipe at its end" {
+	tactus scan sim: --mode ac --count 3 -o run.csv
+	for asked in "--channels 12" "--channels 1,12 --count 2" "--mode dc"; do
+		run -2 --separate-stderr tactus scan replay:run.csv $asked
+		says "run.csv has no $([[ $asked == *12* ]] && echo channel 12 || echo dc readings)"
+		[ -z "$output" ] || fail "$asked: a header for nothing"
+	done
+	run -3 --separate-stderr bash -c 'cat run.csv | tactus scan replay:- --channels 2,12'
+	says "has no channel 12"
+	[ "$(column channel <<<"$output" | tr '\n' ' ')" = "2 2 2 " ] || fail "what it had"
+}
+
+@test "scan replay: two recordings in one file lost no scan between them, however their sequence goes back" {
+	tactus scan sim: --channels 1,2 --count 5 -o run.csv
+	(cat run.csv && grep -v '^#' run.csv | tail -n +2) >twice.csv
+	run -0 --separate-stderr tactus scan replay:twice.csv
+	says "sequence goes back at 1 place"
+	[[ $stderr != *lost\ \(* ]] || fail "nothing was lost"
+	(cat run.csv && grep -v '^#' run.csv | sed '1d; /,2,2,/d; /,2,1,/d') >lossy.csv
+	run -5 --separate-stderr tactus scan replay:lossy.csv
+	says "1 of 10 scans were lost"
 }
 
 @test "scan -m gives newtons live, the same as force does afterwards; --tare takes the first second's mean away" {

@@ -74,6 +74,32 @@ plain_model() {
 	[ "$(wc -l <newtons.csv)" -ge 7 ]
 }
 
+@test "force: a recording of which no reading becomes a force is said to lack what the model needs" {
+	tactus scan sim: --mode ac --count 2 -o ac.csv
+	tactus scan sim: --mode dc --count 2 -o dc.csv
+	run -0 --separate-stderr tactus force -m "$examples/model-weighted.toml" ac.csv
+	says "needs conductance_S of dc rows and capacitance_F of ac rows"
+	says "there is no conductance_S of dc rows"
+	run -0 --separate-stderr tactus force -m "$examples/model-weighted.toml" dc.csv
+	says "there is no capacitance_F of ac rows"
+	run -0 --separate-stderr tactus force -m "$examples/model-weighted.toml" "$examples/recording-readout.csv"
+	says "no reading became a force"
+	run -0 --separate-stderr tactus scan sim: --mode ac --count 2 -m "$examples/model-weighted.toml"
+	says "there is no conductance_S of dc rows"
+	recording 2 | sed 's/^\([0-9.]*,[0-9]*\),./\1,99/' >other.csv
+	plain_model >m.toml
+	run -0 --separate-stderr tactus force -m m.toml other.csv
+	says "quality says why"
+	recording 2 >some.csv
+	run -0 --separate-stderr tactus force -m m.toml some.csv
+	[ -z "$stderr" ] || fail "there are forces"
+}
+
+@test "force: a directory is no model, and is called what it is" {
+	run -3 --separate-stderr tactus force -m . <<<""
+	[ "$stderr" = "tactus force: .: is a directory" ] || fail "what is it"
+}
+
 @test "force: estimating twice replaces the columns" {
 	plain_model >m.toml
 	recording | tactus force -m m.toml >once.csv
@@ -229,6 +255,18 @@ plain_model() {
 	status_is 0
 	prints "1.2e-06 ± 3e-08 S"
 	prints "valid from 0 to 250 N"
+}
+
+@test "show: standard input is told by its first bytes, like a file" {
+	plain_model >m.toml
+	recording >run.csv
+	for file in m.toml run.csv; do
+		tactus show $file | tail -n +2 >named.txt
+		tactus show - <$file | tail -n +2 | cmp - named.txt
+		cat $file | tactus show | tail -n +2 | cmp - named.txt
+	done
+	run -3 --separate-stderr tactus show - </dev/null
+	says "the file is empty"
 }
 
 @test "show a bench: built-in, and a file" {

@@ -84,6 +84,15 @@ cell() { column "$1" <"$2" | sed -n "$3p"; } # NAME FILE ROW
 	[ "$(metadata gain_resistor_ohm <out.csv)" = 1800 ]
 }
 
+@test "metadata that are no number, or none that can be, are status 3 with their line" {
+	loads >in.csv
+	for wrong in abc -3; do
+		sed "s/^# gain_resistor_ohm: .*/# gain_resistor_ohm: $wrong/" in.csv >wrong.csv
+		run -3 --separate-stderr tactus convert wrong.csv
+		says "wrong.csv:$(grep -n gain_resistor wrong.csv | cut -d: -f1): metadata"
+	done
+}
+
 @test "drive and frequency: options for a log without them, refused where nobody states them" {
 	printf 'peak,angle\n1.5,0.2\n' >log.csv
 	run --separate-stderr tactus convert log.csv -g 1kohm --columns amplitude_V=peak,phase_rad=angle
@@ -110,9 +119,13 @@ cell() { column "$1" <"$2" | sed -n "$3p"; } # NAME FILE ROW
 		ac,3,4000,,0.5,ok
 		ac,3,4000,1,0.5,clipped
 		dc,-5,0,-1,,
+		ac,3,-4000,1,0.5,ok
+		ac,3,0,1,0.5,ok
 	END
 	tactus convert in.csv >out.csv
-	[ "$(column quality <out.csv | tr '\n' ' ')" = "ok wrong-sign folded+ill-conditioned clipped missing clipped wrong-sign " ]
+	[ "$(column quality <out.csv | tr '\n' ' ')" = "ok wrong-sign folded+ill-conditioned clipped missing clipped wrong-sign wrong-sign missing " ]
+	[ "$(cell capacitance_std_F out.csv 8)" = "$(cell capacitance_std_F out.csv 1)" ] || fail "an uncertainty has no sign"
+	[ -z "$(cell capacitance_F out.csv 9)$(cell capacitance_std_F out.csv 9)" ]
 	[ -z "$(cell resistance_ohm out.csv 5)" ]
 	near "$(cell resistance_ohm out.csv 2)" "$(cell resistance_ohm out.csv 1)" 1e-15
 }
@@ -274,4 +287,28 @@ check_scan() { # FILE TOLERANCE
 	says --dc-drive
 	run -2 --separate-stderr tactus convert plan.csv -w csv
 	says --dwell
+}
+
+@test "waveform: several channels are never mixed, and what the samples say is not stated beside them" {
+	waveform
+	options="-w csv -o out.csv"
+	run -2 --separate-stderr tactus convert w.csv $options --channels 4,2,7
+	says --dwell
+	run -3 --separate-stderr tactus convert w.csv $options --channels 4,2,7 --dwell 1s
+	says "w.csv: the samples end within the first dwell of 1 s"
+	[ ! -e out.csv ] || fail "one reading of three loads"
+	run -0 --separate-stderr tactus convert w.csv $options --channels 4,2,7 --dwell 30ms
+	run -0 --separate-stderr tactus convert w.csv $options --overwrite --channels 1-4 --dwell 30ms
+	says "after 3 of its 4 readings"
+	awk -F, '/^#/ { next } { print $0 "," (header++ ? $1 < 10.04 ? 1 : 2 : "channel") }' w.csv >by-channel.csv
+	run -0 --separate-stderr tactus convert by-channel.csv $options --overwrite -g 1800 --frequency 4kHz --channels 1,2
+	[ "$(column channel <out.csv | tr '\n' ' ')" = "1 2 " ] || fail "the channel column says where a reading ends"
+	for stated in --drive=1V --drive-phase=1 --dc-drive=1V; do
+		run -2 --separate-stderr tactus convert w.csv -w csv $stated
+		says "${stated%=*}: the drive is sampled"
+	done
+	for rate in 0 -1; do
+		run -2 --separate-stderr tactus convert w.csv -w csv --sample-rate=$rate
+		says "($rate Hz) must be above 0"
+	done
 }

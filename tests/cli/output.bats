@@ -37,6 +37,19 @@ prepare() {
 	done < <(writers)
 }
 
+@test "-o writes through a link, to the file that is there and to one that is not yet" {
+	prepare
+	mkdir -p elsewhere
+	while read -r c; do
+		rm -f elsewhere/*
+		ln -sfn second link
+		ln -sfn elsewhere/out second
+		tactus $c -o link 2>/dev/null || fail "$c: not written"
+		tactus $c -o link --overwrite 2>/dev/null || fail "$c: not replaced"
+		[[ -L link && -L second && -s elsewhere/out && $(ls elsewhere) == out ]] || fail "$c: $(ls -l . elsewhere)"
+	done < <(writers)
+}
+
 @test "fit: a file that exists is refused before the work, not after it" {
 	echo precious >out
 	run --separate-stderr tactus fit nosuch.csv -o out
