@@ -180,8 +180,8 @@ static void print_table(const struct cli *cli, FILE *out, const tactus_fit_resul
 		fprintf(
 			out,
 			"Error of %s in sample and, CV, on stretches of load that the fit has not seen. PER: how much smaller\n"
-			"the mean squared error is than that of `conductance`; bound: the best PER of any linear combination of\n"
-			"the two readings.\n\n",
+			"the mean squared error is than that of `conductance`; bound: the best PER of a weighted mean of the two\n"
+			"single forces.\n\n",
 			strcmp(input, "force_N") == 0 ? "the force" : input);
 		print_figures(out, result, error_figures, COUNT(error_figures));
 		fputs("\nStatic figures in % of full scale:\n\n", out);
@@ -357,7 +357,14 @@ static int fit_all(const struct cli *cli, const tactus_table *recording, tactus_
 			error = status;
 		fitted += status == 0;
 	}
-	int status = fitted ? print_all(cli, n, name, result) : cli_fail(cli, error);
+	bool comparable = false;
+	for (size_t m = 0; m < n; m++)
+		comparable = comparable || (result[m] && in_newtons(result[m]));
+	int status = !fitted      ? cli_fail(cli, error)
+				 : comparable ? print_all(cli, n, name, result)
+							  : cli_error(cli, CLI_USAGE,
+										  "--model all compares errors of the force: this recording has "
+										  "none, and --model forward is all there is to fit");
 	for (size_t m = 0; m < n; m++)
 		tactus_fit_free(result[m]);
 	return status;
@@ -409,7 +416,7 @@ static int run(struct cli *cli)
 
 static const struct cli_option options[] = {
 	{"model", 0, CLI_CHOICE, "NAME", "conductance|capacitance|average|weighted|linear|network|power|forward|all",
-	 "kind of model (default conductance); all: compare them, write none"},
+	 "kind of model (default conductance, in readout forward); all: compare them, write none"},
 	{"effects", 0, CLI_STRING, "NAME,...", NULL, "effects of the catalogue to fit with a forward model"},
 	{"model-file", 'm', CLI_FILE, "MODEL", NULL, "refit this forward model, its base and its effects"},
 	{"output-file", 'o', CLI_FILE, "FILE", NULL, "write the model to FILE (-: standard output, the table to stderr)"},

@@ -127,11 +127,17 @@ static int make_plan(const tactus_fit_options *options, const tactus_series *ser
 					 tactus_plan *plan)
 {
 	const tactus_domain *domain = series->domain;
+	const bool forward = strcmp(k->name, "forward") == 0;
 	*plan = (tactus_plan){.form = k->form};
 	int status = TACTUS_OK;
 	if (options->start) {
 		status = plan_of_start(plan, domain, options->start);
-	} else if (domain == &tactus_domain_sensor && strcmp(k->name, "forward") != 0) {
+	} else if (domain != &tactus_domain_sensor && !forward) {
+		return tactus_fail(TACTUS_ERR_ARGUMENT,
+						   "model '%s' is for the domain sensor; this recording is of %s: fit it with "
+						   "--model forward, the default there",
+						   k->name, domain->name);
+	} else if (!forward) {
 		plan->outputs[0] = k->conductance;
 		plan->outputs[1] = k->capacitance;
 		status = add_effects(plan, domain, k->effects);
@@ -183,7 +189,10 @@ static int work_new(tactus_work *work, const tactus_plan *plan, int folds)
 			return status < 0 ? status : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 		for (size_t p = 0; p < points->n; p++)
 			work->use[c][p] = tactus_plan_wants(plan, points, p);
-		work->problem[c] = tactus_plan_problem(plan, &work->series[c], points, work->use[c]);
+	}
+	work->at_rest = work->series[0].domain == &tactus_domain_sensor && tactus_at_rest(work);
+	for (size_t c = 0; c < work->count; c++) {
+		work->problem[c] = tactus_plan_problem(work, plan, c);
 		if (work->folds[c].count > work->fold_count)
 			work->fold_count = work->folds[c].count;
 	}
@@ -389,7 +398,7 @@ int tactus_fit(const tactus_table *recording, const tactus_fit_options *options,
 	int folds = o->folds ? o->folds : FOLDS;
 	if (folds < 2 || folds > TACTUS_FOLDS_MAX)
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "%d folds: a cross-validation has 2 to %d", folds, TACTUS_FOLDS_MAX);
-	int status = find_kind(o->model ? o->model : "conductance", &k);
+	int status = o->model ? find_kind(o->model, &k) : TACTUS_OK;
 	if (status != TACTUS_OK)
 		return status;
 	tactus_series_options columns = {.domain = o->domain, .input = o->input, .output = o->output};
@@ -399,7 +408,10 @@ int tactus_fit(const tactus_table *recording, const tactus_fit_options *options,
 		status = tactus_series_split(recording, &columns, &series, &count);
 	if (status != TACTUS_OK)
 		return status;
-	status = make_plan(o, series, count, k, &plan);
+	if (!k)
+		status = find_kind(series->domain == &tactus_domain_sensor ? "conductance" : "forward", &k);
+	if (status == TACTUS_OK)
+		status = make_plan(o, series, count, k, &plan);
 	if (status == TACTUS_OK) {
 		tactus_work work = {.recording = recording,
 							.series = series,

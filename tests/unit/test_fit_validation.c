@@ -310,6 +310,24 @@ static void a_dead_an_open_and_a_deaf_channel_are_refused(void **state)
 	tactus_table_free(table);
 }
 
+/* A reading that wanders by itself while the load grows correlates with it, but neighbours say less than they seem to.
+ */
+static void a_slope_that_cannot_be_told_from_none_is_refused(void **state)
+{
+	(void)state;
+	enum { N = 200 };
+	tactus_table *table = rig_table(N);
+	double *force = rig_column(table, "force_N"), *g = rig_column(table, "conductance_S"), wander = 0;
+	uint64_t seed = 41;
+	for (size_t i = 0; i < N; i++) {
+		wander = 0.98 * wander + 1e-8 * rig_noise(&seed);
+		force[i] = 10 + (double)i;
+		g[i] = 1e-6 + wander;
+	}
+	rig_refused(table, NULL, "cannot be told from 0");
+	tactus_table_free(table);
+}
+
 static void a_two_variable_model_needs_a_capacitance(void **state)
 {
 	(void)state;
@@ -389,6 +407,7 @@ int main(void)
 		cmocka_unit_test(too_few_points_are_refused_with_the_number_needed),
 		cmocka_unit_test(a_force_that_never_varies_is_refused),
 		cmocka_unit_test(a_dead_an_open_and_a_deaf_channel_are_refused),
+		cmocka_unit_test(a_slope_that_cannot_be_told_from_none_is_refused),
 		cmocka_unit_test(a_two_variable_model_needs_a_capacitance),
 		cmocka_unit_test(an_effect_that_cannot_be_tested_is_refused_with_its_reason),
 		cmocka_unit_test(a_recording_without_a_reference_is_an_input_error),
