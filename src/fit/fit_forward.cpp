@@ -40,6 +40,16 @@ class Solver
 	bool eliminate(VectorXd &values);
 	/* now.d, after eliminate(values). */
 	bool derivatives(const VectorXd &values);
+	/*
+	 * What was before the first sample is no part of the calibration, and where the first readings do not train the
+	 * others say nothing of it: a wild value would cost a fit nothing and all that is predicted there everything. So
+	 * an initial state is known beforehand to be neutral within two typical changes (a range of the load, for what a
+	 * memory holds of it), and counts as one reading that says so. The weight of that reading:
+	 */
+	double beforehand(size_t slot) const;
+	double spread() const;
+	/* The triangle of [phi d] or [phi d residual] with these readings as further rows. */
+	MatrixXd with_beforehand(const MatrixXd &r, const VectorXd &values) const;
 
 	/* What was computed for these nonlinear parameters (alpha): runs of the chain are what a fit costs. */
 	struct State {
@@ -56,10 +66,56 @@ class Solver
 
   private:
 	bool columns(const VectorXd &values);
+	int descend();
 
 	State accepted; /* the last one with derivatives before now */
 	VectorXd rest, y;
+	double noise = 0; /* the spread() by which an initial state is weighed */
 };
+
+/* Lag-one autocorrelation of the residual within outputs, 0 if negative: neighbours say less than they seem to. */
+double autocorrelation(const ForwardProblem &problem, const VectorXd &residual)
+{
+	double product = 0;
+	Index at = 0;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const Index n = Index(problem.rows[o].size());
+		if (n > 1)
+			product += residual.segment(at, n - 1).dot(residual.segment(at + 1, n - 1));
+		at += n;
+	}
+	const double square = residual.squaredNorm();
+	return square > 0 ? std::fmin(std::fmax(product / square, 0.0), 0.99) : 0;
+}
+
+/* What one reading counts for, by what the fit leaves of it: more, where its neighbours are off alike. */
+double Solver::spread() const
+{
+	const Index spare = now.residual.size() - Index(structure.linear.size() + structure.nonlinear.size());
+	const double f = autocorrelation(problem, now.residual);
+	return now.residual.norm() / std::sqrt(double(std::max<Index>(spare, 1))) * std::sqrt((1 + f) / (1 - f));
+}
+
+double Solver::beforehand(size_t slot) const
+{
+	const Slot &s = problem.slots[slot];
+	return s.info->kind == TACTUS_INITIAL ? noise / (2 * s.scale) : 0;
+}
+
+MatrixXd Solver::with_beforehand(const MatrixXd &r, const VectorXd &values) const
+{
+	const auto k = Index(structure.nonlinear.size()), l = Index(structure.linear.size());
+	MatrixXd all = MatrixXd::Zero(r.rows() + k, r.cols());
+	all.topRows(r.rows()) = r;
+	for (Index i = 0; i < k; i++) {
+		const size_t slot = structure.nonlinear[size_t(i)];
+		const double weight = beforehand(slot), away = values[Index(slot)] - problem.slots[slot].info->neutral;
+		all(r.rows() + i, l + i) = weight;
+		if (r.cols() > l + k)
+			all(r.rows() + i, l + k) = -weight * away;
+	}
+	return all.bottomRows(k).isZero(0) ? r : triangle({all});
+}
 
 /* Those that never change are run once, with the effects neutral: a chain skips them then. */
 bool Solver::columns(const VectorXd &values)
@@ -170,13 +226,18 @@ class Projected : public ceres::CostFunction
 			return false;
 		Eigen::Map<VectorXd> out(residuals, k + 1);
 		if (!jacobians || !jacobians[0]) {
+			double square = solver->now.residual.squaredNorm();
+			for (size_t slot : solver->structure.nonlinear)
+				square += std::pow(
+					solver->beforehand(slot) * (values[Index(slot)] - solver->problem.slots[slot].info->neutral), 2);
 			out.setZero();
-			out[k] = solver->now.residual.norm();
+			out[k] = std::sqrt(square);
 			return true;
 		}
 		if (!solver->derivatives(values))
 			return false;
-		const MatrixXd r = triangle({solver->now.phi, solver->now.d, solver->now.residual});
+		const MatrixXd r =
+			solver->with_beforehand(triangle({solver->now.phi, solver->now.d, solver->now.residual}), values);
 		out = r.block(l, l + k, k + 1, 1);
 		Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> j(jacobians[0], k + 1, k);
 		j = -r.block(l, l, k + 1, k);
@@ -201,8 +262,22 @@ int Solver::minimise()
 		return tactus_fail(TACTUS_ERR_DATA,
 						   "the model gives no finite reading at these inputs, or its parameters cannot "
 						   "be told apart there");
-	if (structure.nonlinear.empty())
-		return TACTUS_OK;
+	const bool remembers = std::any_of(structure.nonlinear.begin(), structure.nonlinear.end(), [this](size_t slot) {
+		return problem.slots[slot].info->kind == TACTUS_INITIAL;
+	});
+	int status = TACTUS_OK;
+	/* What a reading says is known when the fit is done: lightly first, then once more from there. */
+	for (const double part : {0.1, 1.0}) {
+		if (structure.nonlinear.empty() || status != TACTUS_OK || (part < 1 && !remembers))
+			continue;
+		noise = part * spread();
+		status = descend();
+	}
+	return status;
+}
+
+int Solver::descend()
+{
 	std::vector<double> alpha;
 	for (size_t j : structure.nonlinear)
 		alpha.push_back(best[Index(j)]);
@@ -247,21 +322,6 @@ bool Solver::confirmed()
 
 /* ---- errors ---- */
 
-/* Lag-one autocorrelation of the residual within outputs, 0 if negative: neighbours say less than they seem to. */
-double autocorrelation(const ForwardProblem &problem, const VectorXd &residual)
-{
-	double product = 0;
-	Index at = 0;
-	for (size_t o = 0; o < problem.output_count; o++) {
-		const Index n = Index(problem.rows[o].size());
-		if (n > 1)
-			product += residual.segment(at, n - 1).dot(residual.segment(at + 1, n - 1));
-		at += n;
-	}
-	const double square = residual.squaredNorm();
-	return square > 0 ? std::fmin(std::fmax(product / square, 0.0), 0.99) : 0;
-}
-
 /*
  * Standard errors: s² (J'J)⁻¹ with s² the residual variance, times (1 + φ)/(1 − φ) for a residual of lag-one
  * autocorrelation φ (the effective number of samples of an AR(1) process). NaN: at a bound, or not determined.
@@ -276,7 +336,7 @@ VectorXd standard_errors(Solver &solver)
 	std::vector<size_t> order = structure.linear;
 	order.insert(order.end(), structure.nonlinear.begin(), structure.nonlinear.end());
 	const Index n = problem.measured.size(), p = Index(order.size());
-	MatrixXd r = triangle({solver.now.phi, solver.now.d});
+	MatrixXd r = solver.with_beforehand(triangle({solver.now.phi, solver.now.d}), solver.best);
 	VectorXd size(p); /* of a column, per unit of its parameter */
 	for (Index c = 0; c < p; c++) {
 		const size_t j = order[size_t(c)];
@@ -292,11 +352,10 @@ VectorXd standard_errors(Solver &solver)
 	const Index rank = qr.rank();
 	const MatrixXd inverse =
 		qr.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>().solve(MatrixXd::Identity(rank, rank));
-	const double f = autocorrelation(problem, solver.now.residual);
-	const double variance = n > p ? solver.now.residual.squaredNorm() / double(n - p) * (1 + f) / (1 - f) : NAN;
+	const double spread = n > p ? solver.spread() : NAN;
 	for (Index c = 0; c < rank; c++) {
 		const Index column = qr.colsPermutation().indices()[c];
-		errors[Index(order[size_t(column)])] = inverse.row(c).norm() * std::sqrt(variance) / size[column];
+		errors[Index(order[size_t(column)])] = inverse.row(c).norm() * spread / size[column];
 	}
 	return errors;
 }

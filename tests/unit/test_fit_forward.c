@@ -127,6 +127,29 @@ static void lag_and_its_initial_state_are_found(void **state)
 	tactus_table_free(table);
 }
 
+/* What is held out at the beginning says alone how the memory started: the others must not make it up. */
+static void a_start_that_is_held_out_is_taken_as_settled(void **state)
+{
+	(void)state;
+	enum { N = 1500 };
+	tactus_table *table = rig_table(N);
+	double *force = rig_column(table, "force_N"), *g = rig_column(table, "conductance_S");
+	const double tau = 0.5, dt = 0.1;
+	double shown = 0;
+	uint64_t seed = 8;
+	for (size_t i = 0; i < N; i++) {
+		force[i] = 3.5 - 3.5 * cos(0.15 * (double)i);
+		shown = force[i] + (shown - force[i]) * exp(-dt / tau);
+		g[i] = 1e-6 + 3e-6 * shown + 5e-7 * rig_noise(&seed);
+	}
+	tactus_fit_result *result = rig_fit(table, &(tactus_fit_options){.effects = "lag"});
+	const tactus_fit_channel *channel = tactus_fit_channel_at(result, 0);
+	rig_recovered(rig_parameter(result, 0, "lag", "time_constant_s"), tau, 4, 0.05);
+	assert_true(channel->cv_rmse_N < 1.1 * channel->rmse_N);
+	tactus_fit_free(result);
+	tactus_table_free(table);
+}
+
 /* Gain and offset that follow the temperature; both outputs at once, each with its own noise. */
 static void two_outputs_share_no_noise_and_are_both_found(void **state)
 {
@@ -301,6 +324,7 @@ int main(void)
 		cmocka_unit_test(power_finds_exponent_and_base_within_standard_errors),
 		cmocka_unit_test(a_parameter_stops_at_its_bound_and_then_has_no_standard_error),
 		cmocka_unit_test(lag_and_its_initial_state_are_found),
+		cmocka_unit_test(a_start_that_is_held_out_is_taken_as_settled),
 		cmocka_unit_test(two_outputs_share_no_noise_and_are_both_found),
 		cmocka_unit_test(parameters_of_an_output_that_is_not_there_are_not_fitted),
 		cmocka_unit_test(a_refit_starts_from_the_model_and_finds_what_moved),
