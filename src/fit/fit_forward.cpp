@@ -13,6 +13,7 @@
 
 #include "core/core.h"
 #include "fit/converged.hpp"
+#include "fit/forward_instants.hpp"
 #include "fit/forward_structure.hpp"
 
 namespace
@@ -437,35 +438,94 @@ size_t odd_stride(size_t stride)
 	return stride;
 }
 
-int fit(const tactus_series *series, const tactus_effect *const *effects, size_t effect_count,
-		const double *const *weight, bool refit, tactus_model_channel_data *data)
+/* Each output by its own noise, once: what one output says well must not drown in the other's. */
+int solve_each(ForwardProblem &full, ForwardProblem &probe, double *residual)
 {
-	ForwardProblem full(series, effects, effect_count, weight, data, 1);
+	int status = solve(full, probe, residual);
+	const auto there = std::count(full.outputs, full.outputs + full.output_count, true);
+	if (status != TACTUS_OK || there < 2 || full.effects.empty())
+		return status;
+	double noise[TACTUS_OUTPUTS_MAX];
+	for (size_t o = 0; o < full.output_count; o++)
+		noise[o] = residual[o] > 1e-9 * full.output_scale[o] ? residual[o] : full.output_scale[o];
+	full.set_scales(noise);
+	probe.set_scales(noise);
+	probe.slots = full.slots;
+	return solve(full, probe, residual);
+}
+
+/* What is fitted to what: the arguments of tactus_forward_fit(). */
+struct Task {
+	const tactus_series *series;
+	const tactus_effect *const *effects;
+	size_t effect_count;
+	const double *const *weight;
+};
+
+int fit(const Task &t, bool refit, tactus_model_channel_data *data)
+{
+	ForwardProblem full(t.series, t.effects, t.effect_count, t.weight, data, 1);
 	int status = full.prepare(refit);
 	if (status != TACTUS_OK)
 		return status;
 	if (full.measured.size() <= Index(full.slots.size()))
 		return tactus_fail(TACTUS_ERR_DATA, "%zu readings are too few for %zu parameters", size_t(full.measured.size()),
 						   full.slots.size());
-	ForwardProblem thin(series, effects, effect_count, weight, data, odd_stride(series->n / probe_samples + 1));
-	const bool use_thin = series->n > 8 * probe_samples && thin.prepare(refit) == TACTUS_OK &&
+	Instants instants(full);
+	ForwardProblem thin(t.series, t.effects, t.effect_count, t.weight, data,
+						odd_stride(t.series->n / probe_samples + 1));
+	const bool use_thin = t.series->n > 8 * probe_samples && !instants.any() && thin.prepare(refit) == TACTUS_OK &&
 						  thin.measured.size() > 4 * Index(thin.slots.size());
-	ForwardProblem &probe = use_thin ? thin : full;
-	status = solve(full, probe, data->residual_std);
-	bool several = false;
-	for (size_t o = 1; o < full.output_count; o++)
-		several = several || (full.outputs[0] && full.outputs[o]);
-	if (status != TACTUS_OK || !several || effect_count == 0)
+	status = solve_each(full, use_thin ? thin : full, data->residual_std);
+	if (status == TACTUS_OK && instants.any() && instants.place())
+		status = solve(full, full, data->residual_std);
+	return status;
+}
+
+/* Minus twice the logarithm of the likelihood, but for a constant: every output by what is left of it. */
+double misfit(const Task &t, tactus_model_channel_data data)
+{
+	ForwardProblem problem(t.series, t.effects, t.effect_count, t.weight, &data, 1);
+	VectorXd values, y;
+	if (problem.prepare(true) != TACTUS_OK)
+		return INFINITY;
+	values.resize(Index(problem.slots.size()));
+	for (size_t j = 0; j < problem.slots.size(); j++)
+		values[Index(j)] = problem.slots[j].start;
+	if (!problem.simulate(values, y))
+		return INFINITY;
+	double sum = 0;
+	Index at = 0;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const Index n = Index(problem.rows[o].size());
+		if (n)
+			sum += double(n) * std::log((problem.measured - y).segment(at, n).squaredNorm());
+		at += n;
+	}
+	return sum;
+}
+
+/* No effect may leave more than there is without any: then all of them are neutral. */
+int fit_no_worse(const Task &t, bool refit, tactus_model_channel_data *data)
+{
+	const tactus_model_channel_data start = *data;
+	const int status = fit(t, refit, data);
+	if (status != TACTUS_OK || t.effect_count == 0)
 		return status;
-	/* Each output by its own noise, once: what one output says well must not drown in the other's. */
-	double noise[TACTUS_OUTPUTS_MAX];
-	for (size_t o = 0; o < full.output_count; o++)
-		noise[o] = data->residual_std[o] > 1e-9 * full.output_scale[o] ? data->residual_std[o] : full.output_scale[o];
-	full.set_scales(noise);
-	if (use_thin)
-		thin.set_scales(noise);
-	probe.slots = full.slots;
-	return solve(full, probe, data->residual_std);
+	const Task bare{t.series, nullptr, 0, t.weight};
+	tactus_model_channel_data plain = start;
+	if (fit(bare, refit, &plain) != TACTUS_OK || misfit(t, *data) <= misfit(bare, plain))
+		return TACTUS_OK;
+	std::copy_n(plain.base, TACTUS_PARAMETERS_MAX, data->base);
+	std::copy_n(plain.base_std, TACTUS_PARAMETERS_MAX, data->base_std);
+	std::copy_n(plain.residual_std, TACTUS_OUTPUTS_MAX, data->residual_std);
+	for (size_t k = 0; k < t.effect_count; k++)
+		for (size_t i = 0; i < t.effects[k]->parameter_count; i++)
+			if (t.effects[k]->parameters[i].kind != TACTUS_CONSTANT) {
+				data->effect[k][i] = t.effects[k]->parameters[i].neutral;
+				data->effect_std[k][i] = NAN;
+			}
+	return TACTUS_OK;
 }
 
 } // namespace
@@ -498,7 +558,7 @@ extern "C" int tactus_forward_fit(const tactus_series *series, const tactus_effe
 {
 	try {
 		tactus_silence_glog();
-		return fit(series, effects, effect_count, weight, refit, channel);
+		return fit_no_worse({series, effects, effect_count, weight}, refit, channel);
 	} catch (const std::bad_alloc &) {
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	} catch (const std::exception &error) {
