@@ -34,7 +34,7 @@ static const kind kinds[] = {
 struct tactus_fit_result {
 	tactus_model *model;
 	tactus_fit_channel *channels;
-	char **problem;
+	char **problem, **unused;
 	char (*column)[TACTUS_FIT_OUTPUTS][64];
 	size_t count;
 };
@@ -214,6 +214,11 @@ static void score_outputs(const tactus_plan *plan, const tactus_points *points, 
 	free(zero);
 }
 
+static double rms(const tactus_outcome *outcome, size_t n)
+{
+	return sqrt(tactus_mean_square(outcome->estimate_N, outcome->reference_N, n, NULL));
+}
+
 static void score_force(const tactus_points *points, const tactus_outcome *own, const tactus_outcome *conductance,
 						const tactus_outcome *capacitance, tactus_fit_channel *channel)
 {
@@ -243,8 +248,8 @@ static void score_force(const tactus_points *points, const tactus_outcome *own, 
 static tactus_fit_channel blank(int number)
 {
 	tactus_fit_channel c = {.channel = number};
-	c.rmse_N = c.cv_rmse_N = c.reference_mse_N2 = c.reference_cv_mse_N2 = c.error_reduction = c.cv_error_reduction =
-		c.bound = c.cv_bound = c.correlation = NAN;
+	c.rmse_N = c.cv_rmse_N = c.plain_rmse_N = c.reference_mse_N2 = c.reference_cv_mse_N2 = c.error_reduction =
+		c.cv_error_reduction = c.bound = c.cv_bound = c.correlation = NAN;
 	c.figures = (tactus_static_figures){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NULL, NULL, NULL};
 	for (size_t o = 0; o < TACTUS_FIT_OUTPUTS; o++)
 		c.outputs[o].rmse = c.outputs[o].cv_rmse = NAN;
@@ -292,17 +297,20 @@ static int none_left(const tactus_work *work)
 					   work->count > 1 ? " (and no other channel can be fitted)" : "");
 }
 
-/* The plain conductance or capacitance model on the same points, to compare with; NULL where it makes no sense. */
-static int reference(const tactus_work *work, size_t o, tactus_outcome **outcome)
+/* The forward model of these outputs without effects, on the same points; NULL where it makes no sense. */
+static int plain(const tactus_work *work, const bool outputs[TACTUS_OUTPUTS_MAX], tactus_outcome **outcome)
 {
 	const tactus_series *series = &work->series[0];
-	*outcome = NULL;
-	if (work->parameters_only || series->domain != &tactus_domain_sensor || !series->output_name[o] ||
-		!series->output_name[o][0])
-		return TACTUS_OK;
 	tactus_plan plan = {.form = TACTUS_FORM_FORWARD};
-	plan.outputs[o] = true;
 	tactus_model *model = NULL;
+	*outcome = NULL;
+	if (work->parameters_only || series->domain != &tactus_domain_sensor)
+		return TACTUS_OK;
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
+		plan.outputs[o] = outputs[o];
+		if (outputs[o] && (!series->output_name[o] || !series->output_name[o][0]))
+			return TACTUS_OK;
+	}
 	*outcome = calloc(work->count, sizeof **outcome);
 	int status = *outcome ? tactus_plan_run(work, &plan, &model, *outcome, NULL) : TACTUS_ERR_MEMORY;
 	tactus_model_free(model);
@@ -312,7 +320,34 @@ static int reference(const tactus_work *work, size_t o, tactus_outcome **outcome
 typedef struct {
 	const tactus_plan *plan;
 	tactus_outcome *own, *conductance, *capacitance;
+	tactus_outcome *plain; /* of the plan without its effects; NULL if it has none */
 } outcomes;
+
+/* What the estimates are compared with. */
+static int run_references(const tactus_work *work, outcomes *o)
+{
+	static const bool first[TACTUS_OUTPUTS_MAX] = {true}, second[TACTUS_OUTPUTS_MAX] = {false, true};
+	int status = plain(work, first, &o->conductance);
+	if (status == TACTUS_OK)
+		status = plain(work, second, &o->capacitance);
+	if (status == TACTUS_OK && o->plan->effect_count)
+		status = plain(work, o->plan->outputs, &o->plain);
+	return status;
+}
+
+/* Names of the effects that a fit left neutral, with commas between them; NULL if there are none. */
+static char *unused_effects(const tactus_plan *plan, const tactus_model_channel_data *data)
+{
+	char *names = NULL;
+	for (size_t k = 0; k < plan->effect_count; k++) {
+		if (!tactus_effect_neutral(plan->effects[k], data->effect[k]))
+			continue;
+		char *more = tactus_asprintf("%s%s%s", names ? names : "", names ? ", " : "", plan->effects[k]->name);
+		free(names);
+		names = more;
+	}
+	return names;
+}
 
 static int make_result(tactus_work *work, const outcomes *o, tactus_model *model, tactus_fit_result **result)
 {
@@ -321,9 +356,11 @@ static int make_result(tactus_work *work, const outcomes *o, tactus_model *model
 		r->count = work->count;
 		r->channels = calloc(work->count, sizeof *r->channels);
 		r->column = calloc(work->count, sizeof *r->column);
+		r->unused = calloc(work->count, sizeof *r->unused);
 	}
-	if (!r || !r->channels || !r->column) {
+	if (!r || !r->channels || !r->column || !r->unused) {
 		if (r) {
+			free((void *)r->unused);
 			free(r->channels);
 			free(r->column);
 		}
@@ -349,6 +386,9 @@ static int make_result(tactus_work *work, const outcomes *o, tactus_model *model
 		if (work->series[0].domain == &tactus_domain_sensor && !work->parameters_only)
 			score_force(&work->points[c], &o->own[c], o->conductance ? &o->conductance[c] : NULL,
 						o->capacitance ? &o->capacitance[c] : NULL, channel);
+		if (o->plain)
+			channel->plain_rmse_N = rms(&o->plain[c], work->points[c].n);
+		channel->unused = r->unused[c] = unused_effects(o->plan, &model->channels[c]);
 		note_calibration(work, o->plan, c, channel, &model->channels[c]);
 		if (!channel->samples)
 			channel->samples = model->channels[c].samples;
@@ -372,9 +412,7 @@ static int run_work(tactus_work *work, const tactus_plan *plan, const char *name
 	if (status == TACTUS_OK)
 		status = none_left(work);
 	if (status == TACTUS_OK)
-		status = reference(work, 0, &o.conductance);
-	if (status == TACTUS_OK)
-		status = reference(work, 1, &o.capacitance);
+		status = run_references(work, &o);
 	if (status == TACTUS_OK)
 		status = tactus_note_provenance(work->recording, work->series, work->count, name, model);
 	if (status == TACTUS_OK)
@@ -384,6 +422,7 @@ static int run_work(tactus_work *work, const tactus_plan *plan, const char *name
 	tactus_outcome_free(o.own, work->count);
 	tactus_outcome_free(o.conductance, work->count);
 	tactus_outcome_free(o.capacitance, work->count);
+	tactus_outcome_free(o.plain, work->count);
 	return status;
 }
 
@@ -433,8 +472,11 @@ void tactus_fit_free(tactus_fit_result *result)
 {
 	if (!result)
 		return;
-	for (size_t c = 0; c < result->count; c++)
+	for (size_t c = 0; c < result->count; c++) {
 		free(result->problem[c]);
+		free(result->unused[c]);
+	}
+	free((void *)result->unused);
 	free((void *)result->problem);
 	free(result->channels);
 	free(result->column);

@@ -292,6 +292,19 @@ columns() { grep -v '^#' | head -1; }
 	says "column 'channel' is empty in every row"
 }
 
+@test "fit: an effect that makes the force worse is warned of, and what it cannot tell is not ok" {
+	tactus scan sim:lebosse --channels 1 --mode dc -q --protocol 'rest 2s, hold 5N 8s, rest 5s' -o held.csv
+	run --separate-stderr tactus fit held.csv --effects hysteresis -o m.toml
+	status_is 0
+	says "warning: channel 1: with its effects the model gives a worse force than without"
+	tactus fit held.csv --effects hysteresis --json |
+		jq -e '.fit.channels[0] | .rmse_N > 1.01 * .without_effects_rmse_N'
+	tactus fit held.csv --json | jq -e '.fit.channels[0].without_effects_rmse_N == null'
+	tactus force -m m.toml held.csv -o out.csv
+	paste <(column force_estimate_std_N <out.csv) <(column quality <out.csv) >judged
+	awk '$1 > 5.2 { wide++; ok += $2 == "ok" } END { exit !(wide > 0 && ok == 0) }' judged
+}
+
 @test "fit: a model of the force is refused on known loads; the default and forward fit them" {
 	tactus scan sim: --loads standard --channels 1 -q -o loads.csv
 	for model in conductance capacitance average weighted linear network power; do
