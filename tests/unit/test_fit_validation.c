@@ -63,6 +63,27 @@ static void repeated_loads_are_held_out_as_whole_cycles(void **state)
 	tactus_folds_free(&folds);
 }
 
+/* Two of twenty holds are of 5 N, and the same fold would leave out both: nothing would say then what 5 N reads. */
+static void a_load_that_is_there_now_and_then_is_left_to_every_fold(void **state)
+{
+	(void)state;
+	enum { N = 100 };
+	double force[N];
+	for (size_t i = 0; i < N; i++)
+		force[i] = i / 5 % 10 == 2 ? 5 : 0.1 * (double)(i / 5 % 2);
+	tactus_folds folds = {0};
+	assert_int_equal(tactus_folds_new(force, N, 5, &folds), TACTUS_OK);
+	assert_int_equal(folds.count, 2);
+	assert_string_equal(folds.stretches, "load cycles");
+	for (int f = 0; f < folds.count; f++) {
+		double most = 0;
+		for (size_t i = 0; i < N; i++)
+			most = trains(&folds, i, f) ? fmax(most, force[i]) : most;
+		assert_true(most == 5);
+	}
+	tactus_folds_free(&folds);
+}
+
 static void too_few_stretches_make_no_folds(void **state)
 {
 	(void)state;
@@ -396,6 +417,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_staircase_is_held_out_in_whole_steps_with_a_step_of_gap),
 		cmocka_unit_test(repeated_loads_are_held_out_as_whole_cycles),
+		cmocka_unit_test(a_load_that_is_there_now_and_then_is_left_to_every_fold),
 		cmocka_unit_test(too_few_stretches_make_no_folds),
 		cmocka_unit_test(what_is_held_out_says_nothing_about_its_own_prediction),
 		cmocka_unit_test(a_network_that_learns_its_steps_is_found_out),
