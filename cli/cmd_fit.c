@@ -41,10 +41,12 @@ static const struct figure static_figures[] = {
 static const struct figure more_figures[] = {
 	{"", "", "reference_mse_N2", FIELD(reference_mse_N2), 1},
 	{"", "", "reference_cv_mse_N2", FIELD(reference_cv_mse_N2), 1},
+	{"", "", "without_effects_rmse_N", FIELD(plain_rmse_N), 1},
 	{"", "", "correlation", FIELD(correlation), 1},
 };
 
 enum { WIDTH = 11, MODELS_MAX = 16 };
+static const double NOTICED = 1.01; /* times the error without effects: worse, and no rounding */
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
 static double value_of(const struct figure *figure, const tactus_fit_channel *channel)
@@ -149,7 +151,7 @@ static bool in_newtons(const tactus_fit_result *result)
 	return false;
 }
 
-static void note_channel(const struct cli *cli, const tactus_fit_channel *channel)
+static void note_channel(const struct cli *cli, const tactus_fit_channel *channel, const char *unit)
 {
 	const tactus_static_figures *f = &channel->figures;
 	const char *const why[][2] = {{"hysteresis", f->hysteresis_missing},
@@ -159,6 +161,13 @@ static void note_channel(const struct cli *cli, const tactus_fit_channel *channe
 		cli_note(cli, "channel %d is not fitted: %s", channel->channel, channel->problem);
 		return;
 	}
+	if (channel->unused)
+		cli_note(cli, "channel %d: left neutral, for it explains nothing here: %s", channel->channel, channel->unused);
+	if (channel->rmse_N > NOTICED * channel->plain_rmse_N)
+		cli_note(cli,
+				 "warning: channel %d: with its effects the model gives a worse force than without: %.3g %s instead of "
+				 "%.3g in sample; they are not what is wrong here (`tactus diagnose` says what is)",
+				 channel->channel, channel->rmse_N, unit, channel->plain_rmse_N);
 	if (channel->left_out)
 		cli_note(cli, "channel %d: %zu readings left out (clipped, wrong-signed or missing)", channel->channel,
 				 channel->left_out);
@@ -180,8 +189,8 @@ static void print_table(const struct cli *cli, FILE *out, const tactus_fit_resul
 		fprintf(
 			out,
 			"Error of %s in sample and, CV, on stretches of load that the fit has not seen. PER: how much smaller\n"
-			"the mean squared error is than that of `conductance`; bound: the best PER of any linear combination of\n"
-			"the two readings.\n\n",
+			"the mean squared error is than that of `conductance`; bound: the best PER of a weighted mean of the two\n"
+			"single forces.\n\n",
 			strcmp(input, "force_N") == 0 ? "the force" : input);
 		print_figures(out, result, error_figures, COUNT(error_figures));
 		fputs("\nStatic figures in % of full scale:\n\n", out);
@@ -194,7 +203,7 @@ static void print_table(const struct cli *cli, FILE *out, const tactus_fit_resul
 		print_parameters(out, tactus_fit_model(result));
 	}
 	for (size_t c = 0; c < tactus_fit_channels(result); c++)
-		note_channel(cli, tactus_fit_channel_at(result, c));
+		note_channel(cli, tactus_fit_channel_at(result, c), load_unit(result));
 }
 
 /* ---- JSON ---- */
@@ -231,6 +240,7 @@ static void json_channel(struct cli_json *json, const tactus_fit_channel *channe
 	cli_json_number(json, "samples", (double)channel->samples);
 	cli_json_number(json, "left_out", (double)channel->left_out);
 	cli_json_number(json, "ill_conditioned", (double)channel->ill_conditioned);
+	cli_json_string(json, "neutral", channel->unused);
 	cli_json_string(json, "held_out", channel->stretches);
 	json_figures(json, error_figures, COUNT(error_figures), channel);
 	json_figures(json, more_figures, COUNT(more_figures), channel);
@@ -357,7 +367,14 @@ static int fit_all(const struct cli *cli, const tactus_table *recording, tactus_
 			error = status;
 		fitted += status == 0;
 	}
-	int status = fitted ? print_all(cli, n, name, result) : cli_fail(cli, error);
+	bool comparable = false;
+	for (size_t m = 0; m < n; m++)
+		comparable = comparable || (result[m] && in_newtons(result[m]));
+	int status = !fitted      ? cli_fail(cli, error)
+				 : comparable ? print_all(cli, n, name, result)
+							  : cli_error(cli, CLI_USAGE,
+										  "--model all compares errors of the force: this recording has "
+										  "none, and --model forward is all there is to fit");
 	for (size_t m = 0; m < n; m++)
 		tactus_fit_free(result[m]);
 	return status;
@@ -409,7 +426,7 @@ static int run(struct cli *cli)
 
 static const struct cli_option options[] = {
 	{"model", 0, CLI_CHOICE, "NAME", "conductance|capacitance|average|weighted|linear|network|power|forward|all",
-	 "kind of model (default conductance); all: compare them, write none"},
+	 "kind of model (default conductance, in readout forward); all: compare them, write none"},
 	{"effects", 0, CLI_STRING, "NAME,...", NULL, "effects of the catalogue to fit with a forward model"},
 	{"model-file", 'm', CLI_FILE, "MODEL", NULL, "refit this forward model, its base and its effects"},
 	{"output-file", 'o', CLI_FILE, "FILE", NULL, "write the model to FILE (-: standard output, the table to stderr)"},
@@ -436,15 +453,22 @@ const struct cli_command cli_fit = {
 		"of both forces, weighted their inverse-variance mean (the best one only if their errors are uncorrelated: "
 		"linear takes the correlation into account); linear regresses the force on both readings; network is a 2-2-1 "
 		"network; power is conductance with a power law; forward fits all outputs of the domain. --effects adds causes "
-		"of the catalogue to a forward model; -m refits a model file, on the columns that it names. The model file "
+		"of the catalogue to a forward model: one that explains nothing stays neutral, which is said, and a force that "
+		"is "
+		"worse than without them is warned of; -m refits a model file, on the columns that it names. The model file "
 		"keeps where it came from, and which conditions (temperature_degC, drive_V, ...) stayed within 1 %.\n\n"
 		"Errors are root mean squares of estimate minus reference, in the unit of the column that plays the load "
 		"(--input; "
 		"keys of files and of --json end in _N whatever it is), in sample and held out. Held out means blocked "
 		"cross-validation: where the load cycles at least as often as there are folds, whole cycles are left out; else "
-		"whole holds (stretches in which the load stays within 1 % of its range: the steps of a staircase). A fold "
+		"whole holds (stretches in which the load stays within 1 % of its range: the steps of a staircase), unless a "
+		"fold would then "
+		"train on less than 80 % of the range: then cycles, in as many folds as there are. A fold "
 		"leaves out up to four contiguous blocks of them, spread over the recording, and trains on the rest less the "
-		"neighbouring hold on either side of each block. PER is 1 - MSE/MSE of conductance on the same points "
+		"neighbouring hold on either side of each block. What an effect remembers at the first sample belongs to the "
+		"recording, not to the calibration: it counts as neutral within a range of the load until the first readings "
+		"say "
+		"otherwise, and is neutral where they are held out. PER is 1 - MSE/MSE of conductance on the same points "
 		"(Paredes-Madrid 2010, eq. 11); bound is what the best weighted mean of the two single forces could reach, "
 		"1 - r^2 (1-rho^2)/(1+r^2-2 rho r).\n\n"
 		"Static figures are in % of full scale, the span of the reference from no load, of estimate minus reference "

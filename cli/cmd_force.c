@@ -79,7 +79,8 @@ const struct cli_command cli_force = {
 		"decline) are compensated as the readings come. The recording's metadata then name the model by its "
 		"fingerprint.\n\n"
 		"quality is ok, or the reasons why the row is not to be trusted, joined by +: extrapolated where the reading "
-		"or the force lies outside the calibrated range, uncalibrated for a channel that the model does not have, "
+		"or the force lies outside the calibrated range, ill-conditioned where its standard uncertainty is wider than "
+		"that, uncalibrated for a channel that the model does not have, "
 		"dead-zone, saturated, noise-amplified, approximate where a model has both a time offset and mechanical "
 		"crosstalk (a neighbour's load is then of another instant: right as long as loads hold still), and those that "
 		"the reading already had.",

@@ -62,6 +62,7 @@ typedef struct {
 	size_t ill_conditioned;  /**< readings that counted less: (typical uncertainty / theirs)² */
 	double rmse_N;           /**< in sample */
 	double cv_rmse_N;        /**< blocked cross-validation, out of sample */
+	double plain_rmse_N;     /**< in sample, of the same model without its effects; NaN if it has none */
 	double reference_mse_N2; /**< of `conductance` on the same points, in sample; NaN if there is no conductance */
 	double reference_cv_mse_N2;
 	double error_reduction;    /**< 1 - MSE/MSE of `conductance`, in sample (the paper's PER, eq. 11) */
@@ -72,6 +73,7 @@ typedef struct {
 	const char *stretches; /**< what the blocks of the cross-validation are made of, or why there is none */
 	tactus_fit_output outputs[TACTUS_FIT_OUTPUTS]; /**< forward models only */
 	tactus_static_figures figures;
+	const char *unused;  /**< effects that are neutral because they explain nothing, or NULL; owned by the result */
 	const char *problem; /**< why this channel could not be fitted, or NULL; owned by the result */
 } tactus_fit_channel;
 

@@ -19,7 +19,8 @@ enum tactus_quality {
 	TACTUS_QUALITY_CLIPPED = 1 << 0,    /**< "clipped": the ADC or the amplifier is at its end */
 	TACTUS_QUALITY_FOLDED = 1 << 1,     /**< "folded": the phase is within its uncertainty of the detector's fold */
 	TACTUS_QUALITY_WRONG_SIGN = 1 << 2, /**< "wrong-sign": the reading gives a negative R, G or C */
-	TACTUS_QUALITY_ILL_CONDITIONED = 1 << 3, /**< "ill-conditioned": a standard uncertainty is above half its value */
+	/** "ill-conditioned": a standard uncertainty is above half its value; of a force, above the calibrated range */
+	TACTUS_QUALITY_ILL_CONDITIONED = 1 << 3,
 	TACTUS_QUALITY_EXTRAPOLATED = 1 << 4,    /**< "extrapolated": outside the range of the calibration */
 	TACTUS_QUALITY_MISSING = 1 << 5,         /**< "missing": a value that is needed is not there */
 	TACTUS_QUALITY_DEAD_ZONE = 1 << 6,       /**< "dead-zone": any load below the dead zone reads like this */

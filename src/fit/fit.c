@@ -34,7 +34,7 @@ static const kind kinds[] = {
 struct tactus_fit_result {
 	tactus_model *model;
 	tactus_fit_channel *channels;
-	char **problem;
+	char **problem, **unused;
 	char (*column)[TACTUS_FIT_OUTPUTS][64];
 	size_t count;
 };
@@ -127,11 +127,17 @@ static int make_plan(const tactus_fit_options *options, const tactus_series *ser
 					 tactus_plan *plan)
 {
 	const tactus_domain *domain = series->domain;
+	const bool forward = strcmp(k->name, "forward") == 0;
 	*plan = (tactus_plan){.form = k->form};
 	int status = TACTUS_OK;
 	if (options->start) {
 		status = plan_of_start(plan, domain, options->start);
-	} else if (domain == &tactus_domain_sensor && strcmp(k->name, "forward") != 0) {
+	} else if (domain != &tactus_domain_sensor && !forward) {
+		return tactus_fail(TACTUS_ERR_ARGUMENT,
+						   "model '%s' is for the domain sensor; this recording is of %s: fit it with "
+						   "--model forward, the default there",
+						   k->name, domain->name);
+	} else if (!forward) {
 		plan->outputs[0] = k->conductance;
 		plan->outputs[1] = k->capacitance;
 		status = add_effects(plan, domain, k->effects);
@@ -183,7 +189,10 @@ static int work_new(tactus_work *work, const tactus_plan *plan, int folds)
 			return status < 0 ? status : tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 		for (size_t p = 0; p < points->n; p++)
 			work->use[c][p] = tactus_plan_wants(plan, points, p);
-		work->problem[c] = tactus_plan_problem(plan, &work->series[c], points, work->use[c]);
+	}
+	work->at_rest = work->series[0].domain == &tactus_domain_sensor && tactus_at_rest(work);
+	for (size_t c = 0; c < work->count; c++) {
+		work->problem[c] = tactus_plan_problem(work, plan, c);
 		if (work->folds[c].count > work->fold_count)
 			work->fold_count = work->folds[c].count;
 	}
@@ -203,6 +212,11 @@ static void score_outputs(const tactus_plan *plan, const tactus_points *points, 
 		channel->outputs[o].cv_rmse = sqrt(tactus_mean_square(outcome->cv_residual[o], zero, points->n, NULL));
 	}
 	free(zero);
+}
+
+static double rms(const tactus_outcome *outcome, size_t n)
+{
+	return sqrt(tactus_mean_square(outcome->estimate_N, outcome->reference_N, n, NULL));
 }
 
 static void score_force(const tactus_points *points, const tactus_outcome *own, const tactus_outcome *conductance,
@@ -234,8 +248,8 @@ static void score_force(const tactus_points *points, const tactus_outcome *own, 
 static tactus_fit_channel blank(int number)
 {
 	tactus_fit_channel c = {.channel = number};
-	c.rmse_N = c.cv_rmse_N = c.reference_mse_N2 = c.reference_cv_mse_N2 = c.error_reduction = c.cv_error_reduction =
-		c.bound = c.cv_bound = c.correlation = NAN;
+	c.rmse_N = c.cv_rmse_N = c.plain_rmse_N = c.reference_mse_N2 = c.reference_cv_mse_N2 = c.error_reduction =
+		c.cv_error_reduction = c.bound = c.cv_bound = c.correlation = NAN;
 	c.figures = (tactus_static_figures){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NULL, NULL, NULL};
 	for (size_t o = 0; o < TACTUS_FIT_OUTPUTS; o++)
 		c.outputs[o].rmse = c.outputs[o].cv_rmse = NAN;
@@ -283,17 +297,20 @@ static int none_left(const tactus_work *work)
 					   work->count > 1 ? " (and no other channel can be fitted)" : "");
 }
 
-/* The plain conductance or capacitance model on the same points, to compare with; NULL where it makes no sense. */
-static int reference(const tactus_work *work, size_t o, tactus_outcome **outcome)
+/* The forward model of these outputs without effects, on the same points; NULL where it makes no sense. */
+static int plain(const tactus_work *work, const bool outputs[TACTUS_OUTPUTS_MAX], tactus_outcome **outcome)
 {
 	const tactus_series *series = &work->series[0];
-	*outcome = NULL;
-	if (work->parameters_only || series->domain != &tactus_domain_sensor || !series->output_name[o] ||
-		!series->output_name[o][0])
-		return TACTUS_OK;
 	tactus_plan plan = {.form = TACTUS_FORM_FORWARD};
-	plan.outputs[o] = true;
 	tactus_model *model = NULL;
+	*outcome = NULL;
+	if (work->parameters_only || series->domain != &tactus_domain_sensor)
+		return TACTUS_OK;
+	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++) {
+		plan.outputs[o] = outputs[o];
+		if (outputs[o] && (!series->output_name[o] || !series->output_name[o][0]))
+			return TACTUS_OK;
+	}
 	*outcome = calloc(work->count, sizeof **outcome);
 	int status = *outcome ? tactus_plan_run(work, &plan, &model, *outcome, NULL) : TACTUS_ERR_MEMORY;
 	tactus_model_free(model);
@@ -303,7 +320,34 @@ static int reference(const tactus_work *work, size_t o, tactus_outcome **outcome
 typedef struct {
 	const tactus_plan *plan;
 	tactus_outcome *own, *conductance, *capacitance;
+	tactus_outcome *plain; /* of the plan without its effects; NULL if it has none */
 } outcomes;
+
+/* What the estimates are compared with. */
+static int run_references(const tactus_work *work, outcomes *o)
+{
+	static const bool first[TACTUS_OUTPUTS_MAX] = {true}, second[TACTUS_OUTPUTS_MAX] = {false, true};
+	int status = plain(work, first, &o->conductance);
+	if (status == TACTUS_OK)
+		status = plain(work, second, &o->capacitance);
+	if (status == TACTUS_OK && o->plan->effect_count)
+		status = plain(work, o->plan->outputs, &o->plain);
+	return status;
+}
+
+/* Names of the effects that a fit left neutral, with commas between them; NULL if there are none. */
+static char *unused_effects(const tactus_plan *plan, const tactus_model_channel_data *data)
+{
+	char *names = NULL;
+	for (size_t k = 0; k < plan->effect_count; k++) {
+		if (!tactus_effect_neutral(plan->effects[k], data->effect[k]))
+			continue;
+		char *more = tactus_asprintf("%s%s%s", names ? names : "", names ? ", " : "", plan->effects[k]->name);
+		free(names);
+		names = more;
+	}
+	return names;
+}
 
 static int make_result(tactus_work *work, const outcomes *o, tactus_model *model, tactus_fit_result **result)
 {
@@ -312,9 +356,11 @@ static int make_result(tactus_work *work, const outcomes *o, tactus_model *model
 		r->count = work->count;
 		r->channels = calloc(work->count, sizeof *r->channels);
 		r->column = calloc(work->count, sizeof *r->column);
+		r->unused = calloc(work->count, sizeof *r->unused);
 	}
-	if (!r || !r->channels || !r->column) {
+	if (!r || !r->channels || !r->column || !r->unused) {
 		if (r) {
+			free((void *)r->unused);
 			free(r->channels);
 			free(r->column);
 		}
@@ -340,6 +386,9 @@ static int make_result(tactus_work *work, const outcomes *o, tactus_model *model
 		if (work->series[0].domain == &tactus_domain_sensor && !work->parameters_only)
 			score_force(&work->points[c], &o->own[c], o->conductance ? &o->conductance[c] : NULL,
 						o->capacitance ? &o->capacitance[c] : NULL, channel);
+		if (o->plain)
+			channel->plain_rmse_N = rms(&o->plain[c], work->points[c].n);
+		channel->unused = r->unused[c] = unused_effects(o->plan, &model->channels[c]);
 		note_calibration(work, o->plan, c, channel, &model->channels[c]);
 		if (!channel->samples)
 			channel->samples = model->channels[c].samples;
@@ -363,9 +412,7 @@ static int run_work(tactus_work *work, const tactus_plan *plan, const char *name
 	if (status == TACTUS_OK)
 		status = none_left(work);
 	if (status == TACTUS_OK)
-		status = reference(work, 0, &o.conductance);
-	if (status == TACTUS_OK)
-		status = reference(work, 1, &o.capacitance);
+		status = run_references(work, &o);
 	if (status == TACTUS_OK)
 		status = tactus_note_provenance(work->recording, work->series, work->count, name, model);
 	if (status == TACTUS_OK)
@@ -375,6 +422,7 @@ static int run_work(tactus_work *work, const tactus_plan *plan, const char *name
 	tactus_outcome_free(o.own, work->count);
 	tactus_outcome_free(o.conductance, work->count);
 	tactus_outcome_free(o.capacitance, work->count);
+	tactus_outcome_free(o.plain, work->count);
 	return status;
 }
 
@@ -389,7 +437,7 @@ int tactus_fit(const tactus_table *recording, const tactus_fit_options *options,
 	int folds = o->folds ? o->folds : FOLDS;
 	if (folds < 2 || folds > TACTUS_FOLDS_MAX)
 		return tactus_fail(TACTUS_ERR_ARGUMENT, "%d folds: a cross-validation has 2 to %d", folds, TACTUS_FOLDS_MAX);
-	int status = find_kind(o->model ? o->model : "conductance", &k);
+	int status = o->model ? find_kind(o->model, &k) : TACTUS_OK;
 	if (status != TACTUS_OK)
 		return status;
 	tactus_series_options columns = {.domain = o->domain, .input = o->input, .output = o->output};
@@ -399,7 +447,10 @@ int tactus_fit(const tactus_table *recording, const tactus_fit_options *options,
 		status = tactus_series_split(recording, &columns, &series, &count);
 	if (status != TACTUS_OK)
 		return status;
-	status = make_plan(o, series, count, k, &plan);
+	if (!k)
+		status = find_kind(series->domain == &tactus_domain_sensor ? "conductance" : "forward", &k);
+	if (status == TACTUS_OK)
+		status = make_plan(o, series, count, k, &plan);
 	if (status == TACTUS_OK) {
 		tactus_work work = {.recording = recording,
 							.series = series,
@@ -421,8 +472,11 @@ void tactus_fit_free(tactus_fit_result *result)
 {
 	if (!result)
 		return;
-	for (size_t c = 0; c < result->count; c++)
+	for (size_t c = 0; c < result->count; c++) {
 		free(result->problem[c]);
+		free(result->unused[c]);
+	}
+	free((void *)result->unused);
 	free((void *)result->problem);
 	free(result->channels);
 	free(result->column);

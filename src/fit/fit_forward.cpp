@@ -13,6 +13,7 @@
 
 #include "core/core.h"
 #include "fit/converged.hpp"
+#include "fit/forward_instants.hpp"
 #include "fit/forward_structure.hpp"
 
 namespace
@@ -40,6 +41,16 @@ class Solver
 	bool eliminate(VectorXd &values);
 	/* now.d, after eliminate(values). */
 	bool derivatives(const VectorXd &values);
+	/*
+	 * What was before the first sample is no part of the calibration, and where the first readings do not train the
+	 * others say nothing of it: a wild value would cost a fit nothing and all that is predicted there everything. So
+	 * an initial state is known beforehand to be neutral within two typical changes (a range of the load, for what a
+	 * memory holds of it), and counts as one reading that says so. The weight of that reading:
+	 */
+	double beforehand(size_t slot) const;
+	double spread() const;
+	/* The triangle of [phi d] or [phi d residual] with these readings as further rows. */
+	MatrixXd with_beforehand(const MatrixXd &r, const VectorXd &values) const;
 
 	/* What was computed for these nonlinear parameters (alpha): runs of the chain are what a fit costs. */
 	struct State {
@@ -56,10 +67,56 @@ class Solver
 
   private:
 	bool columns(const VectorXd &values);
+	int descend();
 
 	State accepted; /* the last one with derivatives before now */
 	VectorXd rest, y;
+	double noise = 0; /* the spread() by which an initial state is weighed */
 };
+
+/* Lag-one autocorrelation of the residual within outputs, 0 if negative: neighbours say less than they seem to. */
+double autocorrelation(const ForwardProblem &problem, const VectorXd &residual)
+{
+	double product = 0;
+	Index at = 0;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const Index n = Index(problem.rows[o].size());
+		if (n > 1)
+			product += residual.segment(at, n - 1).dot(residual.segment(at + 1, n - 1));
+		at += n;
+	}
+	const double square = residual.squaredNorm();
+	return square > 0 ? std::fmin(std::fmax(product / square, 0.0), 0.99) : 0;
+}
+
+/* What one reading counts for, by what the fit leaves of it: more, where its neighbours are off alike. */
+double Solver::spread() const
+{
+	const Index spare = now.residual.size() - Index(structure.linear.size() + structure.nonlinear.size());
+	const double f = autocorrelation(problem, now.residual);
+	return now.residual.norm() / std::sqrt(double(std::max<Index>(spare, 1))) * std::sqrt((1 + f) / (1 - f));
+}
+
+double Solver::beforehand(size_t slot) const
+{
+	const Slot &s = problem.slots[slot];
+	return s.info->kind == TACTUS_INITIAL ? noise / (2 * s.scale) : 0;
+}
+
+MatrixXd Solver::with_beforehand(const MatrixXd &r, const VectorXd &values) const
+{
+	const auto k = Index(structure.nonlinear.size()), l = Index(structure.linear.size());
+	MatrixXd all = MatrixXd::Zero(r.rows() + k, r.cols());
+	all.topRows(r.rows()) = r;
+	for (Index i = 0; i < k; i++) {
+		const size_t slot = structure.nonlinear[size_t(i)];
+		const double weight = beforehand(slot), away = values[Index(slot)] - problem.slots[slot].info->neutral;
+		all(r.rows() + i, l + i) = weight;
+		if (r.cols() > l + k)
+			all(r.rows() + i, l + k) = -weight * away;
+	}
+	return all.bottomRows(k).isZero(0) ? r : triangle({all});
+}
 
 /* Those that never change are run once, with the effects neutral: a chain skips them then. */
 bool Solver::columns(const VectorXd &values)
@@ -170,13 +227,18 @@ class Projected : public ceres::CostFunction
 			return false;
 		Eigen::Map<VectorXd> out(residuals, k + 1);
 		if (!jacobians || !jacobians[0]) {
+			double square = solver->now.residual.squaredNorm();
+			for (size_t slot : solver->structure.nonlinear)
+				square += std::pow(
+					solver->beforehand(slot) * (values[Index(slot)] - solver->problem.slots[slot].info->neutral), 2);
 			out.setZero();
-			out[k] = solver->now.residual.norm();
+			out[k] = std::sqrt(square);
 			return true;
 		}
 		if (!solver->derivatives(values))
 			return false;
-		const MatrixXd r = triangle({solver->now.phi, solver->now.d, solver->now.residual});
+		const MatrixXd r =
+			solver->with_beforehand(triangle({solver->now.phi, solver->now.d, solver->now.residual}), values);
 		out = r.block(l, l + k, k + 1, 1);
 		Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> j(jacobians[0], k + 1, k);
 		j = -r.block(l, l, k + 1, k);
@@ -201,8 +263,22 @@ int Solver::minimise()
 		return tactus_fail(TACTUS_ERR_DATA,
 						   "the model gives no finite reading at these inputs, or its parameters cannot "
 						   "be told apart there");
-	if (structure.nonlinear.empty())
-		return TACTUS_OK;
+	const bool remembers = std::any_of(structure.nonlinear.begin(), structure.nonlinear.end(), [this](size_t slot) {
+		return problem.slots[slot].info->kind == TACTUS_INITIAL;
+	});
+	int status = TACTUS_OK;
+	/* What a reading says is known when the fit is done: lightly first, then once more from there. */
+	for (const double part : {0.1, 1.0}) {
+		if (structure.nonlinear.empty() || status != TACTUS_OK || (part < 1 && !remembers))
+			continue;
+		noise = part * spread();
+		status = descend();
+	}
+	return status;
+}
+
+int Solver::descend()
+{
 	std::vector<double> alpha;
 	for (size_t j : structure.nonlinear)
 		alpha.push_back(best[Index(j)]);
@@ -247,21 +323,6 @@ bool Solver::confirmed()
 
 /* ---- errors ---- */
 
-/* Lag-one autocorrelation of the residual within outputs, 0 if negative: neighbours say less than they seem to. */
-double autocorrelation(const ForwardProblem &problem, const VectorXd &residual)
-{
-	double product = 0;
-	Index at = 0;
-	for (size_t o = 0; o < problem.output_count; o++) {
-		const Index n = Index(problem.rows[o].size());
-		if (n > 1)
-			product += residual.segment(at, n - 1).dot(residual.segment(at + 1, n - 1));
-		at += n;
-	}
-	const double square = residual.squaredNorm();
-	return square > 0 ? std::fmin(std::fmax(product / square, 0.0), 0.99) : 0;
-}
-
 /*
  * Standard errors: s² (J'J)⁻¹ with s² the residual variance, times (1 + φ)/(1 − φ) for a residual of lag-one
  * autocorrelation φ (the effective number of samples of an AR(1) process). NaN: at a bound, or not determined.
@@ -276,7 +337,7 @@ VectorXd standard_errors(Solver &solver)
 	std::vector<size_t> order = structure.linear;
 	order.insert(order.end(), structure.nonlinear.begin(), structure.nonlinear.end());
 	const Index n = problem.measured.size(), p = Index(order.size());
-	MatrixXd r = triangle({solver.now.phi, solver.now.d});
+	MatrixXd r = solver.with_beforehand(triangle({solver.now.phi, solver.now.d}), solver.best);
 	VectorXd size(p); /* of a column, per unit of its parameter */
 	for (Index c = 0; c < p; c++) {
 		const size_t j = order[size_t(c)];
@@ -292,11 +353,10 @@ VectorXd standard_errors(Solver &solver)
 	const Index rank = qr.rank();
 	const MatrixXd inverse =
 		qr.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>().solve(MatrixXd::Identity(rank, rank));
-	const double f = autocorrelation(problem, solver.now.residual);
-	const double variance = n > p ? solver.now.residual.squaredNorm() / double(n - p) * (1 + f) / (1 - f) : NAN;
+	const double spread = n > p ? solver.spread() : NAN;
 	for (Index c = 0; c < rank; c++) {
 		const Index column = qr.colsPermutation().indices()[c];
-		errors[Index(order[size_t(column)])] = inverse.row(c).norm() * std::sqrt(variance) / size[column];
+		errors[Index(order[size_t(column)])] = inverse.row(c).norm() * spread / size[column];
 	}
 	return errors;
 }
@@ -378,35 +438,94 @@ size_t odd_stride(size_t stride)
 	return stride;
 }
 
-int fit(const tactus_series *series, const tactus_effect *const *effects, size_t effect_count,
-		const double *const *weight, bool refit, tactus_model_channel_data *data)
+/* Each output by its own noise, once: what one output says well must not drown in the other's. */
+int solve_each(ForwardProblem &full, ForwardProblem &probe, double *residual)
 {
-	ForwardProblem full(series, effects, effect_count, weight, data, 1);
+	int status = solve(full, probe, residual);
+	const auto there = std::count(full.outputs, full.outputs + full.output_count, true);
+	if (status != TACTUS_OK || there < 2 || full.effects.empty())
+		return status;
+	double noise[TACTUS_OUTPUTS_MAX];
+	for (size_t o = 0; o < full.output_count; o++)
+		noise[o] = residual[o] > 1e-9 * full.output_scale[o] ? residual[o] : full.output_scale[o];
+	full.set_scales(noise);
+	probe.set_scales(noise);
+	probe.slots = full.slots;
+	return solve(full, probe, residual);
+}
+
+/* What is fitted to what: the arguments of tactus_forward_fit(). */
+struct Task {
+	const tactus_series *series;
+	const tactus_effect *const *effects;
+	size_t effect_count;
+	const double *const *weight;
+};
+
+int fit(const Task &t, bool refit, tactus_model_channel_data *data)
+{
+	ForwardProblem full(t.series, t.effects, t.effect_count, t.weight, data, 1);
 	int status = full.prepare(refit);
 	if (status != TACTUS_OK)
 		return status;
 	if (full.measured.size() <= Index(full.slots.size()))
 		return tactus_fail(TACTUS_ERR_DATA, "%zu readings are too few for %zu parameters", size_t(full.measured.size()),
 						   full.slots.size());
-	ForwardProblem thin(series, effects, effect_count, weight, data, odd_stride(series->n / probe_samples + 1));
-	const bool use_thin = series->n > 8 * probe_samples && thin.prepare(refit) == TACTUS_OK &&
+	Instants instants(full);
+	ForwardProblem thin(t.series, t.effects, t.effect_count, t.weight, data,
+						odd_stride(t.series->n / probe_samples + 1));
+	const bool use_thin = t.series->n > 8 * probe_samples && !instants.any() && thin.prepare(refit) == TACTUS_OK &&
 						  thin.measured.size() > 4 * Index(thin.slots.size());
-	ForwardProblem &probe = use_thin ? thin : full;
-	status = solve(full, probe, data->residual_std);
-	bool several = false;
-	for (size_t o = 1; o < full.output_count; o++)
-		several = several || (full.outputs[0] && full.outputs[o]);
-	if (status != TACTUS_OK || !several || effect_count == 0)
+	status = solve_each(full, use_thin ? thin : full, data->residual_std);
+	if (status == TACTUS_OK && instants.any() && instants.place())
+		status = solve(full, full, data->residual_std);
+	return status;
+}
+
+/* Minus twice the logarithm of the likelihood, but for a constant: every output by what is left of it. */
+double misfit(const Task &t, tactus_model_channel_data data)
+{
+	ForwardProblem problem(t.series, t.effects, t.effect_count, t.weight, &data, 1);
+	VectorXd values, y;
+	if (problem.prepare(true) != TACTUS_OK)
+		return INFINITY;
+	values.resize(Index(problem.slots.size()));
+	for (size_t j = 0; j < problem.slots.size(); j++)
+		values[Index(j)] = problem.slots[j].start;
+	if (!problem.simulate(values, y))
+		return INFINITY;
+	double sum = 0;
+	Index at = 0;
+	for (size_t o = 0; o < problem.output_count; o++) {
+		const Index n = Index(problem.rows[o].size());
+		if (n)
+			sum += double(n) * std::log((problem.measured - y).segment(at, n).squaredNorm());
+		at += n;
+	}
+	return sum;
+}
+
+/* No effect may leave more than there is without any: then all of them are neutral. */
+int fit_no_worse(const Task &t, bool refit, tactus_model_channel_data *data)
+{
+	const tactus_model_channel_data start = *data;
+	const int status = fit(t, refit, data);
+	if (status != TACTUS_OK || t.effect_count == 0)
 		return status;
-	/* Each output by its own noise, once: what one output says well must not drown in the other's. */
-	double noise[TACTUS_OUTPUTS_MAX];
-	for (size_t o = 0; o < full.output_count; o++)
-		noise[o] = data->residual_std[o] > 1e-9 * full.output_scale[o] ? data->residual_std[o] : full.output_scale[o];
-	full.set_scales(noise);
-	if (use_thin)
-		thin.set_scales(noise);
-	probe.slots = full.slots;
-	return solve(full, probe, data->residual_std);
+	const Task bare{t.series, nullptr, 0, t.weight};
+	tactus_model_channel_data plain = start;
+	if (fit(bare, refit, &plain) != TACTUS_OK || misfit(t, *data) <= misfit(bare, plain))
+		return TACTUS_OK;
+	std::copy_n(plain.base, TACTUS_PARAMETERS_MAX, data->base);
+	std::copy_n(plain.base_std, TACTUS_PARAMETERS_MAX, data->base_std);
+	std::copy_n(plain.residual_std, TACTUS_OUTPUTS_MAX, data->residual_std);
+	for (size_t k = 0; k < t.effect_count; k++)
+		for (size_t i = 0; i < t.effects[k]->parameter_count; i++)
+			if (t.effects[k]->parameters[i].kind != TACTUS_CONSTANT) {
+				data->effect[k][i] = t.effects[k]->parameters[i].neutral;
+				data->effect_std[k][i] = NAN;
+			}
+	return TACTUS_OK;
 }
 
 } // namespace
@@ -439,7 +558,7 @@ extern "C" int tactus_forward_fit(const tactus_series *series, const tactus_effe
 {
 	try {
 		tactus_silence_glog();
-		return fit(series, effects, effect_count, weight, refit, channel);
+		return fit_no_worse({series, effects, effect_count, weight}, refit, channel);
 	} catch (const std::bad_alloc &) {
 		return tactus_fail(TACTUS_ERR_MEMORY, "out of memory");
 	} catch (const std::exception &error) {

@@ -51,7 +51,10 @@ typedef struct {
 	const char *stretches; /* "load cycles" or "holds": what a block is made of (a literal) */
 } tactus_folds;
 
-/* Blocks of whole load cycles where there are enough, else of whole holds; a hold's gap on both sides of a block. */
+/*
+ * Blocks of whole load cycles where there are enough, else of whole holds; a hold's gap on both sides of a block. Where
+ * a fold would then not have seen the range of the load, blocks of cycles again, in as many folds as there are.
+ */
 int tactus_folds_new(const double *input, size_t n, int count, tactus_folds *folds);
 void tactus_folds_free(tactus_folds *folds);
 

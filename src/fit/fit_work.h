@@ -26,6 +26,7 @@ typedef struct {
 	int fold_count; /* 0: no cross-validation */
 	bool **use;     /* per channel and point: has what the model needs */
 	char **problem; /* per channel: why it is not fitted, or NULL */
+	bool at_rest;   /* nothing was loaded, as far as the reference says */
 	uint64_t seed;
 	size_t starts;
 	int jobs;
@@ -58,9 +59,10 @@ tactus_moments tactus_moments_of(const double *x, const bool *use, size_t n);
 const char *tactus_output_label(const tactus_series *series, size_t o);
 /* True if the point has what the plan needs. */
 bool tactus_plan_wants(const tactus_plan *plan, const tactus_points *points, size_t p);
+/* True if the loads of all channels together are no more than the reference's noise. */
+bool tactus_at_rest(const tactus_work *work);
 /* Why a channel cannot be fitted (allocated), NULL if it can. */
-char *tactus_plan_problem(const tactus_plan *plan, const tactus_series *series, const tactus_points *points,
-						  const bool *use);
+char *tactus_plan_problem(const tactus_work *work, const tactus_plan *plan, size_t channel);
 
 /* Calls task(context, i) for every i < count on `jobs` threads. */
 void tactus_parallel(int jobs, size_t count, void (*task)(void *context, size_t i), void *context);

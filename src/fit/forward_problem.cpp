@@ -19,7 +19,7 @@ bool fitted(const tactus_parameter &parameter, const bool *outputs)
 
 ForwardProblem::ForwardProblem(const tactus_series *s, const tactus_effect *const *e, size_t count,
 							   const double *const *w, tactus_model_channel_data *d, size_t stride)
-	: series(s), effects(e, e + count), data(d), samples((s->n + stride - 1) / stride), step(stride)
+	: effects(e, e + count), series(s), data(d), samples((s->n + stride - 1) / stride), step(stride)
 {
 	const tactus_domain *domain = s->domain;
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX && tactus_output_signal(domain, o) != SIZE_MAX; o++) {
@@ -135,6 +135,34 @@ bool ForwardProblem::simulate(const VectorXd &values, VectorXd &y)
 		for (const Row &row : rows[o])
 			y[at++] = predicted[o][row.sample] * row.root_weight / output_scale[o];
 	return y.allFinite();
+}
+
+std::vector<Slot> ForwardProblem::take(long effect, size_t index)
+{
+	const auto at =
+		std::find_if(slots.begin(), slots.end(), [&](const Slot &s) { return s.effect == effect && s.index == index; });
+	data->effect[effect][index] = effects[size_t(effect)]->parameters[index].neutral;
+	data->effect_std[effect][index] = NAN;
+	if (at == slots.end())
+		return {};
+	const Slot taken = *at;
+	slots.erase(at);
+	return {taken};
+}
+
+void ForwardProblem::put(long effect, size_t index, double value)
+{
+	data->effect[effect][index] = value;
+}
+
+const double *ForwardProblem::clock() const
+{
+	return signal[tactus_role_signal(series->domain, TACTUS_ROLE_TIME)];
+}
+
+size_t ForwardProblem::clock_size() const
+{
+	return samples;
 }
 
 bool ForwardProblem::memoryless() const

@@ -51,6 +51,13 @@ class ForwardProblem
 	/* The chain with these values, at the rows, weighted. False if anything there is not finite. */
 	bool simulate(const VectorXd &values, VectorXd &y);
 	bool memoryless() const;
+	/* Takes a parameter out of what is fitted (its slot, if it was there) and sets it to its neutral value. */
+	std::vector<Slot> take(long effect, size_t index);
+	/* Sets a parameter of an effect that is not fitted. */
+	void put(long effect, size_t index, double value);
+	/* The clock of the series as it is simulated: seconds, one per sample. */
+	const double *clock() const;
+	size_t clock_size() const;
 	/* Values and standard errors into the channel's data. */
 	void store(const VectorXd &values, const VectorXd &errors);
 
@@ -60,13 +67,13 @@ class ForwardProblem
 	std::vector<Row> rows[TACTUS_OUTPUTS_MAX]; /* of each output; stacked in this order everywhere */
 	VectorXd measured;                         /* reading × √weight / scale of its output */
 	std::vector<Slot> slots;
+	std::vector<const tactus_effect *> effects;
 
   private:
 	void add_slot(long effect, size_t index, const tactus_parameter &info, double &value, bool refit);
 	void thin(size_t stride);
 
 	const tactus_series *series;
-	std::vector<const tactus_effect *> effects;
 	tactus_model_channel_data *data;
 	const double *weight[TACTUS_OUTPUTS_MAX] = {};
 	size_t samples, step;

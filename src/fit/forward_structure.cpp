@@ -88,8 +88,9 @@ class Explorer
 		structure.nonlinear.clear();
 		structure.delta.assign(problem.slots.size(), 0);
 		for (size_t j = 0; j < problem.slots.size(); j++) {
-			const bool linear =
-				!structure.never_linear[j] && problem.slots[j].info->kind != TACTUS_SHAPE && find_delta(j) && affine(j);
+			const enum tactus_parameter_kind kind = problem.slots[j].info->kind;
+			const bool linear = !structure.never_linear[j] && kind != TACTUS_SHAPE && kind != TACTUS_INITIAL &&
+								find_delta(j) && affine(j);
 			if (!linear)
 				structure.nonlinear.push_back(j);
 			else if (independent(j))

@@ -89,6 +89,24 @@ static void set_weights(enum tactus_form form, tactus_model_channel_data *data)
 	data->estimator[1] = 1 - data->estimator[0];
 }
 
+/* A line whose slope cannot be told from none measures nothing. */
+static int want_slope(const run *r, const tactus_series *series, const tactus_model_channel_data *data)
+{
+	static const int slope[] = {SENSOR_BASE_G1, SENSOR_BASE_C1};
+	if (series->domain != &tactus_domain_sensor || r->plan->effect_count)
+		return TACTUS_OK; /* an effect may stand in for it */
+	for (size_t o = 0; o < TACTUS_COUNT(slope); o++) {
+		const double value = data->base[slope[o]], error = data->base_std[slope[o]];
+		if (r->plan->outputs[o] && fabs(value) < 2 * error)
+			return tactus_fail(
+				TACTUS_ERR_DATA,
+				"%s does not follow the force: its slope of %.3g cannot be told from 0 (standard error %.2g); "
+				"apply loads over the sensor's range",
+				tactus_output_label(series, o), value, error);
+	}
+	return TACTUS_OK;
+}
+
 static int fit_base(const run *r, size_t slot, size_t channel, tactus_model_channel_data *data)
 {
 	double *weight[TACTUS_OUTPUTS_MAX] = {NULL};
@@ -104,6 +122,8 @@ static int fit_base(const run *r, size_t slot, size_t channel, tactus_model_chan
 									(const double *const *)weight, from != NULL, data);
 	for (size_t o = 0; o < TACTUS_OUTPUTS_MAX; o++)
 		free(weight[o]);
+	if (status == TACTUS_OK && slot == 0)
+		status = want_slope(r, &r->work->series[channel], data);
 	if (status != TACTUS_OK || r->plan->form == TACTUS_FORM_FORWARD)
 		return status;
 	set_weights(r->plan->form, data);

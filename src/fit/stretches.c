@@ -117,6 +117,22 @@ static void gaps(const size_t *hold, size_t holds, size_t n, tactus_folds *folds
 	}
 }
 
+/* True if every fold trains on loads that nearly span the range: what it has never seen it can only extrapolate to. */
+static bool span(const double *input, size_t n, double range, const tactus_folds *folds)
+{
+	for (int f = 0; f < folds->count; f++) {
+		double low = INFINITY, high = -INFINITY;
+		for (size_t i = 0; i < n; i++)
+			if (folds->train[i] >> f & 1) {
+				low = fmin(low, input[i]);
+				high = fmax(high, input[i]);
+			}
+		if (!(high - low >= 0.8 * range))
+			return false;
+	}
+	return true;
+}
+
 int tactus_folds_new(const double *input, size_t n, int count, tactus_folds *folds)
 {
 	folds->fold = calloc(n ? n : 1, sizeof *folds->fold);
@@ -135,6 +151,13 @@ int tactus_folds_new(const double *input, size_t n, int count, tactus_folds *fol
 	folds->count = cyclic || holds >= 2 * (size_t)count ? count : 0;
 	if (folds->count) {
 		deal(cyclic ? cycle : hold, cyclic ? turns : holds, n, folds);
+		gaps(hold, holds, n, folds);
+	}
+	/* A load that is only there now and then: fewer folds, each with some of it. */
+	if (folds->count && !cyclic && turns >= 2 && !span(input, n, range, folds)) {
+		folds->stretches = "load cycles";
+		folds->count = turns < (size_t)count ? (int)turns : count;
+		deal(cycle, turns, n, folds);
 		gaps(hold, holds, n, folds);
 	}
 	free(hold);

@@ -13,6 +13,8 @@
  * Dead zone: where the forward model is flat at the low end of the calibrated range (or at 0) and the reading is within
  * 3σ of that end, all forces whose reading lies within σ of this one are possible: force = middle, std = width/√12.
  *
+ * Ill-conditioned: the uncertainty is wider than the calibrated range, or infinite where the model is flat.
+ *
  * Saturated: no force gives the reading. The force is NaN, the memory is fed the upper end of the calibrated range.
  */
 #include "model/inverse.h"
@@ -325,6 +327,13 @@ static bool beyond(double value, double low, double high, double std)
 	return value < low - tolerance || value > high + tolerance;
 }
 
+/* An uncertainty as wide as all that was calibrated says that the reading says nothing; NaN: it is not known. */
+static bool says_nothing(const tactus_inverse *inverse, double std)
+{
+	const double range = inverse->calibrated_high - inverse->calibrated_low;
+	return isinf(std) || (range > 0 && std > range);
+}
+
 static tactus_inverse_result solve_output(tactus_inverse *inverse, reading_model *output, double reading,
 										  double reading_std)
 {
@@ -349,6 +358,8 @@ static tactus_inverse_result solve_output(tactus_inverse *inverse, reading_model
 		result.quality |= TACTUS_QUALITY_SATURATED;
 		result.memory = inverse->calibrated_high;
 	}
+	if (says_nothing(inverse, result.std))
+		result.quality |= TACTUS_QUALITY_ILL_CONDITIONED;
 	if (beyond(reading, output->minimum, output->maximum, sigma) ||
 		beyond(result.force, inverse->calibrated_low, inverse->calibrated_high, result.std))
 		result.quality |= TACTUS_QUALITY_EXTRAPOLATED;

@@ -324,6 +324,8 @@ static bool any_complete(const tactus_columns *columns, const tactus_series *ser
 static int split(const tactus_columns *columns, const groups *g, bool inputs_only, tactus_series *series)
 {
 	bool complete = inputs_only;
+	if (g->count == 0 && columns->rows > 0)
+		return tactus_fail(TACTUS_ERR_DATA, "%scolumn 'channel' is empty in every row", tactus_columns_where(columns));
 	for (size_t i = 0; i < g->count; i++) {
 		if (fill_series(columns, &g->items[i], inputs_only, &series[i]) < 0)
 			return tactus_fail(TACTUS_ERR_MEMORY, "no memory for %zu rows", columns->rows);

@@ -285,6 +285,12 @@ columns() { grep -v '^#' | head -1; }
 		says "force_N never varies by more than noise: it is -0."
 		says "apply loads over the sensor's range"
 	done
+	# of eight channels and four scans some correlate by chance
+	tactus scan sim: -q --count 4 -o four.csv
+	run --separate-stderr tactus fit four.csv -o m.toml
+	status_is 1
+	[ ! -e m.toml ]
+	says "force_N never varies by more than noise"
 	# half of the readings below zero are left out: it is the load all the same
 	recording 10 | awk -F, -v OFS=, 'NR > 1 { $4 = 0; $5 = (NR % 3 - 1) * 1e-9 } { print }' >zero.csv
 	run --separate-stderr tactus fit zero.csv -o m.toml
@@ -298,6 +304,46 @@ columns() { grep -v '^#' | head -1; }
 	run --separate-stderr tactus fit few.csv -o m.toml
 	status_is 1
 	says "3 points are too few: 2 parameters need at least 4; record more"
+}
+
+@test "fit: what a recording lacks is named: a capacitance in dc, the channel's numbers" {
+	tactus scan sim:lebosse --mode dc --count 60 -q -o dc.csv
+	run --separate-stderr tactus fit dc.csv --model weighted
+	status_is 1
+	says "capacitance_F is empty in every row"
+	recording | awk -F, -v OFS=, 'NR > 1 { $3 = "" } { print }' >bare.csv
+	run --separate-stderr tactus fit bare.csv
+	status_is 1
+	says "column 'channel' is empty in every row"
+}
+
+@test "fit: an effect that makes the force worse is warned of, and what it cannot tell is not ok" {
+	tactus scan sim:lebosse --channels 1 --mode dc -q --protocol 'rest 2s, hold 5N 8s, rest 5s' -o held.csv
+	run --separate-stderr tactus fit held.csv --effects hysteresis -o m.toml
+	status_is 0
+	says "warning: channel 1: with its effects the model gives a worse force than without"
+	tactus fit held.csv --effects hysteresis --json |
+		jq -e '.fit.channels[0] | .rmse_N > 1.01 * .without_effects_rmse_N'
+	tactus fit held.csv --json | jq -e '.fit.channels[0].without_effects_rmse_N == null'
+	tactus force -m m.toml held.csv -o out.csv
+	paste <(column force_estimate_std_N <out.csv) <(column quality <out.csv) >judged
+	awk '$1 > 5.2 { wide++; ok += $2 == "ok" } END { exit !(wide > 0 && ok == 0) }' judged
+}
+
+@test "fit: a model of the force is refused on known loads; the default and forward fit them" {
+	tactus scan sim: --loads standard --channels 1 -q -o loads.csv
+	for model in conductance capacitance average weighted linear network power; do
+		run --separate-stderr tactus fit loads.csv --model $model -o m.toml
+		status_is 2
+		says "model '$model' is for the domain sensor; this recording is of readout"
+	done
+	run --separate-stderr tactus fit loads.csv --model all
+	status_is 2
+	[ ! -e m.toml ]
+	tactus fit loads.csv -q >default
+	tactus fit loads.csv --model forward -q >forward
+	cmp default forward
+	grep -q gain_resistor_ohm forward
 }
 
 @test "fit --model forward: a column that a scan in dc leaves empty is no output, unless it is asked for" {

@@ -332,6 +332,21 @@ static void outside_the_calibrated_readings_it_says_so(void **unused)
 	tactus_model_free(model);
 }
 
+/* Calibrated over 10 N: a reading that leaves the force open by more says nothing. */
+static void an_uncertainty_above_the_calibrated_range_is_not_ok(void **unused)
+{
+	(void)unused;
+	for (int wide = 0; wide < 2; wide++) {
+		tactus_model *model = rig_model("G", 1);
+		set_noise(model, (wide ? 10.1 : 9.9) * rig_g1, NAN);
+		tactus_table *table = estimates_of(model, 1, (double[]){3});
+		rig_near(tactus_table_numbers(table, "force_estimate_std_N")[0], wide ? 10.1 : 9.9, 1e-6);
+		assert_int_equal(rig_quality(table, 0), wide ? TACTUS_QUALITY_ILL_CONDITIONED : TACTUS_QUALITY_OK);
+		tactus_table_free(table);
+		tactus_model_free(model);
+	}
+}
+
 static void a_reading_that_does_not_depend_on_the_load_has_no_force(void **unused)
 {
 	(void)unused;
@@ -379,6 +394,7 @@ int main(void)
 		cmocka_unit_test(while_saturated_the_memory_is_fed_the_end_of_the_range),
 		cmocka_unit_test(outside_the_calibrated_range_it_says_so),
 		cmocka_unit_test(outside_the_calibrated_readings_it_says_so),
+		cmocka_unit_test(an_uncertainty_above_the_calibrated_range_is_not_ok),
 		cmocka_unit_test(a_reading_that_does_not_depend_on_the_load_has_no_force),
 		cmocka_unit_test(a_falling_characteristic_is_inverted),
 	};

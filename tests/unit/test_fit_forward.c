@@ -127,6 +127,76 @@ static void lag_and_its_initial_state_are_found(void **state)
 	tactus_table_free(table);
 }
 
+/* A triangle of 0 to 10 N at 10 Hz, and a reading that jumps by `step` newtons of it at 37 s and by half at 61 s. */
+static tactus_table *jumping(double step)
+{
+	enum { N = 1000 };
+	tactus_table *table = rig_table(N);
+	double *force = rig_column(table, "force_N"), *g = rig_column(table, "conductance_S");
+	uint64_t seed = 9;
+	for (size_t i = 0; i < N; i++) {
+		force[i] = fabs((double)(i % 100) - 50) / 5;
+		const double jumped = i < 370 ? 0 : i < 610 ? step : 1.5 * step;
+		g[i] = 1e-6 * (1 + force[i] + jumped) + 1e-8 * rig_noise(&seed);
+	}
+	return table;
+}
+
+static void steps_are_found_at_their_instants_and_no_more_of_them(void **state)
+{
+	(void)state;
+	tactus_table *table = jumping(1);
+	tactus_fit_result *result = rig_fit(table, &(tactus_fit_options){.effects = "step-change"});
+	const double first = rig_parameter(result, 0, "step-change", "time_1_s").value;
+	const double second = rig_parameter(result, 0, "step-change", "time_2_s").value;
+	rig_near(fmin(first, second), 37, 1e-9);
+	rig_near(fmax(first, second), 61, 1e-9);
+	rig_recovered(
+		rig_parameter(result, 0, "step-change", first < second ? "conductance_offset_1_S" : "conductance_offset_2_S"),
+		1e-6, 4, 1e-8);
+	assert_true(rig_parameter(result, 0, "step-change", "conductance_offset_3_S").value == 0);
+	assert_true(rig_parameter(result, 0, "step-change", "conductance_gain_3").value == 0);
+	assert_true(tactus_fit_channel_at(result, 0)->rmse_N < 0.011);
+	assert_null(tactus_fit_channel_at(result, 0)->unused);
+	tactus_fit_free(result);
+	tactus_table_free(table);
+}
+
+static void an_effect_that_is_not_there_stays_neutral_and_is_named(void **state)
+{
+	(void)state;
+	tactus_table *table = jumping(0);
+	tactus_fit_result *result = rig_fit(table, &(tactus_fit_options){.effects = "step-change"});
+	const tactus_fit_channel *channel = tactus_fit_channel_at(result, 0);
+	assert_string_equal(channel->unused, "step-change");
+	assert_true(channel->rmse_N == channel->plain_rmse_N && channel->cv_rmse_N < 0.011);
+	tactus_fit_free(result);
+	tactus_table_free(table);
+}
+
+/* What is held out at the beginning says alone how the memory started: the others must not make it up. */
+static void a_start_that_is_held_out_is_taken_as_settled(void **state)
+{
+	(void)state;
+	enum { N = 1500 };
+	tactus_table *table = rig_table(N);
+	double *force = rig_column(table, "force_N"), *g = rig_column(table, "conductance_S");
+	const double tau = 0.5, dt = 0.1;
+	double shown = 0;
+	uint64_t seed = 8;
+	for (size_t i = 0; i < N; i++) {
+		force[i] = 3.5 - 3.5 * cos(0.15 * (double)i);
+		shown = force[i] + (shown - force[i]) * exp(-dt / tau);
+		g[i] = 1e-6 + 3e-6 * shown + 5e-7 * rig_noise(&seed);
+	}
+	tactus_fit_result *result = rig_fit(table, &(tactus_fit_options){.effects = "lag"});
+	const tactus_fit_channel *channel = tactus_fit_channel_at(result, 0);
+	rig_recovered(rig_parameter(result, 0, "lag", "time_constant_s"), tau, 4, 0.05);
+	assert_true(channel->cv_rmse_N < 1.1 * channel->rmse_N);
+	tactus_fit_free(result);
+	tactus_table_free(table);
+}
+
 /* Gain and offset that follow the temperature; both outputs at once, each with its own noise. */
 static void two_outputs_share_no_noise_and_are_both_found(void **state)
 {
@@ -301,6 +371,9 @@ int main(void)
 		cmocka_unit_test(power_finds_exponent_and_base_within_standard_errors),
 		cmocka_unit_test(a_parameter_stops_at_its_bound_and_then_has_no_standard_error),
 		cmocka_unit_test(lag_and_its_initial_state_are_found),
+		cmocka_unit_test(steps_are_found_at_their_instants_and_no_more_of_them),
+		cmocka_unit_test(an_effect_that_is_not_there_stays_neutral_and_is_named),
+		cmocka_unit_test(a_start_that_is_held_out_is_taken_as_settled),
 		cmocka_unit_test(two_outputs_share_no_noise_and_are_both_found),
 		cmocka_unit_test(parameters_of_an_output_that_is_not_there_are_not_fitted),
 		cmocka_unit_test(a_refit_starts_from_the_model_and_finds_what_moved),

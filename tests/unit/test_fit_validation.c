@@ -63,6 +63,27 @@ static void repeated_loads_are_held_out_as_whole_cycles(void **state)
 	tactus_folds_free(&folds);
 }
 
+/* Two of twenty holds are of 5 N, and the same fold would leave out both: nothing would say then what 5 N reads. */
+static void a_load_that_is_there_now_and_then_is_left_to_every_fold(void **state)
+{
+	(void)state;
+	enum { N = 100 };
+	double force[N];
+	for (size_t i = 0; i < N; i++)
+		force[i] = i / 5 % 10 == 2 ? 5 : 0.1 * (double)(i / 5 % 2);
+	tactus_folds folds = {0};
+	assert_int_equal(tactus_folds_new(force, N, 5, &folds), TACTUS_OK);
+	assert_int_equal(folds.count, 2);
+	assert_string_equal(folds.stretches, "load cycles");
+	for (int f = 0; f < folds.count; f++) {
+		double most = 0;
+		for (size_t i = 0; i < N; i++)
+			most = trains(&folds, i, f) ? fmax(most, force[i]) : most;
+		assert_true(most == 5);
+	}
+	tactus_folds_free(&folds);
+}
+
 static void too_few_stretches_make_no_folds(void **state)
 {
 	(void)state;
@@ -310,6 +331,24 @@ static void a_dead_an_open_and_a_deaf_channel_are_refused(void **state)
 	tactus_table_free(table);
 }
 
+/* A reading that wanders by itself while the load grows correlates with it, but neighbours say less than they seem to.
+ */
+static void a_slope_that_cannot_be_told_from_none_is_refused(void **state)
+{
+	(void)state;
+	enum { N = 200 };
+	tactus_table *table = rig_table(N);
+	double *force = rig_column(table, "force_N"), *g = rig_column(table, "conductance_S"), wander = 0;
+	uint64_t seed = 41;
+	for (size_t i = 0; i < N; i++) {
+		wander = 0.98 * wander + 1e-8 * rig_noise(&seed);
+		force[i] = 10 + (double)i;
+		g[i] = 1e-6 + wander;
+	}
+	rig_refused(table, NULL, "cannot be told from 0");
+	tactus_table_free(table);
+}
+
 static void a_two_variable_model_needs_a_capacitance(void **state)
 {
 	(void)state;
@@ -378,6 +417,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_staircase_is_held_out_in_whole_steps_with_a_step_of_gap),
 		cmocka_unit_test(repeated_loads_are_held_out_as_whole_cycles),
+		cmocka_unit_test(a_load_that_is_there_now_and_then_is_left_to_every_fold),
 		cmocka_unit_test(too_few_stretches_make_no_folds),
 		cmocka_unit_test(what_is_held_out_says_nothing_about_its_own_prediction),
 		cmocka_unit_test(a_network_that_learns_its_steps_is_found_out),
@@ -389,6 +429,7 @@ int main(void)
 		cmocka_unit_test(too_few_points_are_refused_with_the_number_needed),
 		cmocka_unit_test(a_force_that_never_varies_is_refused),
 		cmocka_unit_test(a_dead_an_open_and_a_deaf_channel_are_refused),
+		cmocka_unit_test(a_slope_that_cannot_be_told_from_none_is_refused),
 		cmocka_unit_test(a_two_variable_model_needs_a_capacitance),
 		cmocka_unit_test(an_effect_that_cannot_be_tested_is_refused_with_its_reason),
 		cmocka_unit_test(a_recording_without_a_reference_is_an_input_error),
