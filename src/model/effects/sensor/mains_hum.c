@@ -88,7 +88,42 @@ static void add_power(const tactus_series *series, size_t output, double first_H
 		power[k] += (re[k] * re[k] + im[k] * im[k]) / total;
 }
 
-/* The strongest lines near each nominal frequency, from where a fit finds the frequency itself. */
+/* The power of all outputs together, as above. */
+static void look(const tactus_series *series, double first_Hz, double step_Hz, size_t looks, double *power)
+{
+	for (size_t k = 0; k < looks; k++)
+		power[k] = 0;
+	for (size_t output = SENSOR_G; output <= SENSOR_C; output++)
+		if (series->signal[output] != NULL)
+			add_power(series, output, first_Hz, step_Hz, looks, power);
+}
+
+static size_t strongest(const double *power, size_t looks)
+{
+	size_t best = 0;
+	for (size_t k = 1; k < looks; k++)
+		best = power[k] > power[best] ? k : best;
+	return best;
+}
+
+/*
+ * A line within a step to either side, to a small part of it: a noise that was judged with the line in it has a notch
+ * there, and only what stands in the notch is seen as that line.
+ */
+static double refined(const tactus_series *series, double line_Hz, double step_Hz)
+{
+	enum { FINER = 16, AROUND = 2 * FINER + 1 };
+	double power[AROUND];
+	for (int pass = 0; pass < 2; pass++) {
+		double fine_Hz = step_Hz / FINER, first_Hz = line_Hz - step_Hz;
+		look(series, first_Hz, fine_Hz, AROUND, power);
+		line_Hz = first_Hz + (double)strongest(power, AROUND) * fine_Hz;
+		step_Hz = fine_Hz;
+	}
+	return line_Hz;
+}
+
+/* The nominal frequencies, and the strongest lines near them, from where a fit finds the frequency itself. */
 static size_t propose(const tactus_series *series, size_t parameter, double *values, size_t most)
 {
 	(void)parameter;
@@ -97,19 +132,17 @@ static size_t propose(const tactus_series *series, size_t parameter, double *val
 	for (size_t n = 0; n < NOMINALS; n++) {
 		if (!(alias_Hz(series, nominal_Hz[n]) > 0))
 			continue;
-		double power[LOOKS] = {0}, first_Hz = nominal_Hz[n] - tolerance_Hz;
+		if (count < most)
+			values[count++] = nominal_Hz[n];
+		double power[LOOKS], first_Hz = nominal_Hz[n] - tolerance_Hz;
 		double step_Hz = fmax(0.5 / duration_s, 2 * tolerance_Hz / (LOOKS - 1));
 		size_t looks = (size_t)(2 * tolerance_Hz / step_Hz) + 1;
-		for (size_t output = SENSOR_G; output <= SENSOR_C; output++)
-			if (series->signal[output] != NULL)
-				add_power(series, output, first_Hz, step_Hz, looks, power);
+		look(series, first_Hz, step_Hz, looks, power);
 		for (size_t peak = 0; peak < PEAKS && count < most; peak++) {
-			size_t best = 0;
-			for (size_t k = 1; k < looks; k++)
-				best = power[k] > power[best] ? k : best;
+			size_t best = strongest(power, looks);
 			if (!(power[best] > 0))
 				break;
-			values[count++] = first_Hz + (double)best * step_Hz;
+			values[count++] = refined(series, first_Hz + (double)best * step_Hz, step_Hz);
 			for (size_t k = best < 2 ? 0 : best - 2; k < looks && k <= best + 2; k++)
 				power[k] = 0;
 		}
