@@ -100,12 +100,12 @@ static void headline(const struct page *page, const tactus_diagnosed *series)
 		words_add(&words, "The simulation is off by %s. Ambiguous: ", by);
 		if (cause)
 			effects_rival(&words, cause, " or ");
-		for (size_t i = 1; i < series->cause_count; i++)
+		for (size_t i = 1; cause && i < series->cause_count; i++)
 			words_add(&words, "%s%s",
 					  i == 1                        ? "; beside that "
 					  : i + 1 < series->cause_count ? ", "
 													: " and ",
-					  series->causes[i].effect);
+					  cause[i].effect);
 		break;
 	case TACTUS_VERDICT_UNEXPLAINED:
 		words_add(&words, "The simulation is off by %s. Unexplained: %s%s", by,

@@ -18,7 +18,7 @@ import cases_stale
 import cases_unknown
 from recording import csv_text
 
-TUNING_SEEDS, TEST_SEEDS, REPORT_SEEDS = range(1000, 50000), range(50000, 60000), range(107000, 1000000)
+TUNING_SEEDS, TEST_SEEDS, REPORT_SEEDS = range(1000, 50000), range(50000, 60000), range(109000, 1000000)
 
 FRESH = ("nonlinearity", "saturation", "dead-zone", "hysteresis", "creep", "lag", "temperature", "voltage-dependence",
          "self-heating", "time-offset", "switch-resistance", "stray-capacitance", "constant-phase-element",

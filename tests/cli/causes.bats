@@ -421,6 +421,9 @@ left_over() {
 	tactus diagnose creeps.csv -m old.toml --json >said.json
 	jq -e '.series[0] | .causes[0].effect == "creep" and (.moved | test("g1 from .*%")) and
 		.force_rmse_N > 3 * .gain.force_rmse_before_N' said.json
+	# What the film remembered before the first reading is said where it can be read off.
+	jq -e 'all(.series[0].causes[].parameters[]; (.name | startswith("initial_") | not) or
+		(.value | fabs) > .standard_error)' said.json
 	tactus diagnose creeps.csv -m old.toml >page.txt
 	grep -q '^Moved  *beside that the calibration no longer holds: ' page.txt
 }
