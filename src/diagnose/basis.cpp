@@ -263,7 +263,8 @@ std::vector<Group> groups_of(const Problem &problem, const std::vector<Extra> &e
 		collect.add("row order", "level", row_before(problem), row_before(problem));
 	/* What comes again at the same times of every recording, in jumps too: an operator's habit, something nearby. */
 	const size_t time = tactus_role_signal(domain, TACTUS_ROLE_TIME);
-	if (problem.segments.size() > 1 && problem.segments.front()->has_clock)
+	if (problem.segments.size() > 1 &&
+		std::all_of(problem.segments.begin(), problem.segments.end(), tactus_series_clock))
 		collect.add(domain->signals[time].name, "stretch", stretches(problem), problem.at_rows(time));
 	/* What was put together anew between recordings: nobody wrote a column of it. */
 	const Index recordings = Index(problem.segments.size());

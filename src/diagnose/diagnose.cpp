@@ -265,7 +265,8 @@ void Diagnosis::explain(Work &work)
 	work.full.hypothesis = problem.levelled(work.full.hypothesis, Rows::all);
 	work.errors = standard_errors(problem, work.full);
 	/* Where the order of the memory's past cannot be read off, it is neutral: numbers without a meaning are none. */
-	if (drop_undetermined(work.full, work.errors, h = work.full.hypothesis)) {
+	h = work.full.hypothesis;
+	if (drop_undetermined(work.full, work.errors, h)) {
 		const Fit fit = problem.fit(h, Rows::all);
 		if (fit.ok) {
 			work.full = fit;

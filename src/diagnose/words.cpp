@@ -124,6 +124,8 @@ std::string unit_in_name(const std::string &column)
 bool same_times(const Problem &problem)
 {
 	const tactus_series *first = problem.segments.front();
+	if (!std::all_of(problem.segments.begin(), problem.segments.end(), tactus_series_clock))
+		return false;
 	return std::all_of(problem.segments.begin(), problem.segments.end(), [&](const tactus_series *s) {
 		return std::abs(tactus_series_clock(s)[0] - tactus_series_clock(first)[0]) <
 			   0.1 * tactus_series_duration_s(first);

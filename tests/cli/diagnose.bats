@@ -185,6 +185,14 @@ survives() {
 	tactus diagnose "$creep" more.csv --json >result.json
 	contract <result.json
 	jq -e --arg a "$creep" '.recordings == [$a, "more.csv"]' result.json
+	# One of them may have no clock.
+	made "g += 3e-7 * sin(i / 20)" 400 | cut -d, -f1,4,5 >clock.csv
+	cut -d, -f2,3 clock.csv >none.csv
+	for pair in "clock.csv none.csv" "none.csv clock.csv"; do
+		# shellcheck disable=SC2086 # two names
+		tactus diagnose $pair --json >result.json
+		contract <result.json
+	done
 }
 
 @test "an offset of each recording that no column holds is an unrecorded cause" {

@@ -130,7 +130,7 @@ static size_t propose(const tactus_series *series, size_t parameter, double *val
 	size_t count = 0;
 	double duration_s = tactus_series_duration_s(series);
 	for (size_t n = 0; n < NOMINALS; n++) {
-		if (!(alias_Hz(series, nominal_Hz[n]) > 0))
+		if (tactus_series_clock(series) == NULL || !(alias_Hz(series, nominal_Hz[n]) > 0))
 			continue;
 		if (count < most)
 			values[count++] = nominal_Hz[n];
