@@ -139,7 +139,7 @@ size_t tactus_effect_parameters(const tactus_effect *effect)
 /* "output0/degC" → "output/degC": which output it acts on is in its name. */
 static const char *public_unit(const char *unit)
 {
-	static const char *const units[] = {"output", "output/degC"};
+	static const char *const units[] = {"output", "output/degC", "output/V2"};
 	for (size_t i = 0; i < TACTUS_COUNT(units); i++)
 		if (strncmp(unit, "output", 6) == 0 && strcmp(unit + 7, units[i] + 6) == 0)
 			return units[i];

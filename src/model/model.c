@@ -34,9 +34,9 @@ const tactus_signal *tactus_domain_signal(const tactus_domain *domain, enum tact
 }
 
 /* Units of parameters that are said in those of a model's columns. */
-static const char *const own_units[] = {"output0",      "output0/N", "output0/degC", "output1", "output1/N",
-										"output1/degC", "N",         "1/N",          "1/N2",    "1/N/s",
-										"1/N2/s",       "N/S",       "N/F"};
+static const char *const own_units[] = {
+	"output0", "output0/N", "output0/degC", "output0/V2", "output1", "output1/N", "output1/degC",
+	"N",       "1/N",       "1/N2",         "1/N/s",      "1/N2/s",  "N/S",       "N/F"};
 
 const char *tactus_form_name(enum tactus_form form)
 {
