@@ -404,20 +404,7 @@ left_over() {
 		    s[k] = s[k - 1] + (f[k] - s[k - 1]) * 0.02 / 8
 		g = 2e-6 + 3.3e-7 * (f + 0.08 * s) + 3e-8 * np.random.default_rng(8).normal(size=t.size)
 	EOP
-	cat >old.toml <<-'EOM'
-		kind = "model"
-		format = 1
-		domain = "sensor"
-		form = "forward"
-		[output.conductance_S]
-		[[channel]]
-		channel = 1
-		[channel.base]
-		g0 = 2e-6
-		g1 = 3e-7
-		[channel.reading.conductance_S]
-		residual_std = 3e-8
-	EOM
+	linear_model 2e-6 3e-7 3e-8 >old.toml
 	tactus diagnose creeps.csv -m old.toml --json >said.json
 	jq -e '.series[0] | .causes[0].effect == "creep" and (.moved | test("g1 from .*%")) and
 		.force_rmse_N > 3 * .gain.force_rmse_before_N' said.json

@@ -21,19 +21,7 @@ setup_file() {
 	EOB
 	tactus scan sim:creep.toml --protocol "$loads" --channels 1 --mode dc -q -o creep.csv
 	tactus scan sim:creep.toml --protocol "$loads" --channels 1-3 --mode dc -q -o three.csv
-	cat >plain.toml <<-'EOM'
-		kind = "model"
-		format = 1
-		domain = "sensor"
-		form = "forward"
-		[output.conductance_S]
-		[[channel]]
-		channel = 1
-		input_range = [0, 200]
-		base = { g0 = 1.2e-6, g1 = 4.1e-7 }
-		[channel.reading.conductance_S]
-		residual_std = 4.1e-8
-	EOM
+	linear_model 1.2e-6 4.1e-7 4.1e-8 >plain.toml
 	tactus simulate -m plain.toml --protocol "$loads" --rate 5Hz --noise --seed 4 -o plain.csv
 	sed 's/g1 = 4.1e-7/g1 = 3.4e-7/' plain.toml >stale.toml
 }

@@ -30,6 +30,23 @@ contract() {
 			(all(.candidates[]; keys_unsorted == ["effect","delta_bic","why"]))))' >/dev/null
 }
 
+# linear_model G0 G1 NOISE: G = g0 + g1 F of channel 1, without effects.
+linear_model() {
+	cat <<-EOM
+		kind = "model"
+		format = 1
+		domain = "sensor"
+		form = "forward"
+		[output.conductance_S]
+		[[channel]]
+		channel = 1
+		input_range = [0, 200]
+		base = { g0 = $1, g1 = $2 }
+		[channel.reading.conductance_S]
+		residual_std = $3
+	EOM
+}
+
 # Rows of a sensor recording on standard output, made by an awk body that may set t, f (N), g (S) and x.
 made() {
 	awk -v n="${2:-600}" "BEGIN {
